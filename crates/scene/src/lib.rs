@@ -1,0 +1,26 @@
+//! What both ends agree on before the first frame: geometry, materials, lights, cameras, animation.
+//!
+//! Conventions (glTF's): right-handed, Y up, metres, seconds, radians, linear light. Transforms are named
+//! `a_from_b`; positions and directions say their space (`position_world`, `normal_rest`).
+//!
+//! A [`Scene`] is plain data. [`Scene::pose`] gives everything that moves at one time as a [`Pose`].
+
+mod animation;
+mod camera;
+mod light;
+mod material;
+mod mesh;
+mod pose;
+mod scene;
+
+pub use animation::{Animation, Channel, ChannelTarget, Interpolation};
+pub use camera::{Camera, PosedCamera, Projection};
+pub use light::{Light, LightKind, PosedLight};
+pub use material::{
+    AlphaMode, Filter, Image, Material, NormalTexture, Texture, TextureRef, Wrap,
+};
+pub use mesh::{Mesh, MorphTarget, Part, SkinInfluences};
+pub use pose::{DeformedMesh, Pose, PosedInstance};
+pub use scene::{Aabb, Instance, LocalTransform, Node, Scene, SceneHash, Skin, Warning};
+
+pub use glam;

@@ -1,0 +1,40 @@
+//! Everything that moves, at one time.
+
+use std::sync::Arc;
+
+use glam::{Affine3A, Vec3};
+
+use crate::{PosedCamera, PosedLight};
+
+/// The scene at one time. Lists run parallel to the scene's.
+#[derive(Clone, Debug, Default)]
+pub struct Pose {
+    /// Seconds.
+    pub time: f64,
+    /// World transform of every node.
+    pub world_from_node: Vec<Affine3A>,
+    /// One for each of [`crate::Scene::instances`].
+    pub instances: Vec<PosedInstance>,
+    /// Every placed light, in node order.
+    pub lights: Vec<PosedLight>,
+    /// Every placed camera, in node order, with its index into [`crate::Scene::cameras`].
+    pub cameras: Vec<(u32, PosedCamera)>,
+}
+
+/// An instance at one time.
+#[derive(Clone, Debug)]
+pub struct PosedInstance {
+    /// World from mesh space; the identity for skinned instances, whose vertices are posed in the world.
+    pub world_from_mesh: Affine3A,
+    /// Vertices that replace the mesh's, for skinned and morphed instances.
+    pub deformed: Option<Arc<DeformedMesh>>,
+}
+
+/// Posed vertices: mesh space for morphed meshes, world space for skinned ones (then `world_from_mesh` is the identity).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DeformedMesh {
+    /// One for each of the mesh's vertices.
+    pub positions: Vec<Vec3>,
+    /// Unit normals.
+    pub normals: Vec<Vec3>,
+}

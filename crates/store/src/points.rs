@@ -1,0 +1,15 @@
+//! Points on surfaces that carry visibility ([Neff2023] sec. 3.2, in rest space).
+//!
+//! A point is anchored to a place on an instance's surface in that instance's *rest space*
+//! (`dapple_scene::Instance::rest_from_mesh`): nothing about it changes when the instance moves or bends,
+//! except its visibility. So a store is an immutable [`PointLayout`] and one byte a point.
+
+mod layout;
+mod morton;
+mod normal;
+mod store;
+
+pub use layout::{LayoutError, PointLayout, PointSet, MAX_COORDINATE, MAX_POINTS};
+pub use morton::{morton_code, morton_decode};
+pub use normal::PackedNormal;
+pub use store::{Change, PointStore, StoreError};
