@@ -16,9 +16,7 @@ mod scene;
 pub use animation::{Animation, Channel, ChannelTarget, Interpolation};
 pub use camera::{Camera, PosedCamera, Projection};
 pub use light::{Light, LightKind, PosedLight};
-pub use material::{
-    AlphaMode, Filter, Image, Material, NormalTexture, Texture, TextureRef, Wrap,
-};
+pub use material::{AlphaMode, Filter, Image, Material, NormalTexture, Texture, TextureRef, Wrap};
 pub use mesh::{Mesh, MorphTarget, Part, SkinInfluences};
 pub use pose::{DeformedMesh, Pose, PosedInstance};
 pub use scene::{Aabb, Instance, LocalTransform, Node, Scene, SceneHash, Skin, Warning};

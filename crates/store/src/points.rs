@@ -9,7 +9,7 @@ mod morton;
 mod normal;
 mod store;
 
-pub use layout::{LayoutError, PointLayout, PointSet, MAX_COORDINATE, MAX_POINTS};
+pub use layout::{LayoutError, MAX_COORDINATE, MAX_POINTS, PointLayout, PointSet};
 pub use morton::{morton_code, morton_decode};
 pub use normal::PackedNormal;
 pub use store::{Change, PointStore, StoreError};
