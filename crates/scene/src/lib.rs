@@ -12,6 +12,7 @@ mod material;
 mod mesh;
 mod pose;
 mod scene;
+mod surface;
 
 pub use animation::{Animation, Channel, ChannelTarget, Interpolation};
 pub use camera::{Camera, PosedCamera, Projection};

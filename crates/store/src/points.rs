@@ -4,11 +4,13 @@
 //! (`dapple_scene::Instance::rest_from_mesh`): nothing about it changes when the instance moves or bends,
 //! except its visibility. So a store is an immutable [`PointLayout`] and one byte a point.
 
+mod grid;
 mod layout;
 mod morton;
 mod normal;
 mod store;
 
+pub use grid::CellGrid;
 pub use layout::{LayoutError, MAX_COORDINATE, MAX_POINTS, PointLayout, PointSet};
 pub use morton::{morton_code, morton_decode};
 pub use normal::PackedNormal;
