@@ -1,1 +1,2 @@
 //! dapple-render
+pub mod psao;
