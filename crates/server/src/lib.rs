@@ -1,1 +1,142 @@
-//! dapple-server
+//! The server's half: scene + trace + stream. One [`Server::step`] a tick, frames out; no socket, no clock.
+//!
+//! ```text
+//! pose(now) ─► tracer ─► updater (what changed) ─► publisher ─► frames for every subscriber
+//! ```
+
+use std::sync::Arc;
+
+use dapple_scene::{Pose, Scene};
+use dapple_store::points::PointStore;
+use dapple_stream::{Frame, PublishError, Publisher, PublisherConfig};
+use dapple_trace::Tracer;
+use dapple_trace::psao::generate::{GenerateError, GenerateParams, GeneratedPoints, generate_points};
+use dapple_trace::psao::update::{UpdateError, UpdateParams, Updater};
+
+/// Settings of a server. Each group documents its own ranges and defaults.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ServerConfig {
+    /// How points are laid.
+    pub generate: GenerateParams,
+    /// How they are traced.
+    pub update: UpdateParams,
+    /// How changes are grouped.
+    pub publish: PublisherConfig,
+}
+
+/// What a long start is doing, for progress bars.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// Laying points: instances done, of how many.
+    Laying(usize, usize),
+    /// Tracing every point once: points done, of how many.
+    Tracing(usize, usize),
+}
+
+/// Why a server did not start or step.
+#[derive(Debug, thiserror::Error)]
+pub enum ServerError {
+    /// Points could not be laid.
+    #[error(transparent)]
+    Generate(#[from] GenerateError),
+    /// Settings of the update are out of range.
+    #[error(transparent)]
+    Update(#[from] UpdateError),
+    /// The changes could not be published.
+    #[error(transparent)]
+    Publish(#[from] PublishError),
+}
+
+/// What one step did.
+#[derive(Clone, Debug, Default)]
+pub struct StepReport {
+    /// What subscribers that are up to date must receive, in order; empty when nothing changed.
+    pub frames: Vec<Frame>,
+    /// Points traced.
+    pub traced: u32,
+    /// Rays traced.
+    pub rays: u64,
+    /// Points whose published visibility changed.
+    pub changed: u32,
+}
+
+/// A scene that is being lit.
+pub struct Server {
+    scene: Arc<Scene>,
+    tracer: Tracer,
+    updater: Updater,
+    publisher: Publisher,
+    dropped_inside: u32,
+}
+
+impl Server {
+    /// Lays and traces all points at time 0 and publishes the first snapshot, which [`Server::join`] returns.
+    pub fn new(
+        scene: Arc<Scene>,
+        config: &ServerConfig,
+        progress: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Server, ServerError> {
+        let pose = scene.pose(0.0);
+        let tracer = Tracer::new(&scene, &pose);
+        let instances = scene.instances.len();
+        let laying = |done| progress(Progress::Laying(done, instances));
+        let points = generate_points(&scene, &pose, &tracer, &config.generate, &laying)?;
+        Server::with_points(scene, pose, tracer, points, config, progress)
+    }
+
+    /// Like [`Server::new`] with points that were laid before, in this scene at time 0.
+    pub fn with_points(
+        scene: Arc<Scene>,
+        pose: Pose,
+        tracer: Tracer,
+        points: GeneratedPoints,
+        config: &ServerConfig,
+        progress: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Server, ServerError> {
+        let (count, dropped_inside) = (points.anchors.len(), points.dropped_inside);
+        let tracing = |done| progress(Progress::Tracing(done, count));
+        let updater = Updater::new(&scene, &pose, &tracer, points, config.update, &tracing)?;
+        let mut publisher = Publisher::new(scene.hash().0, config.publish);
+        publisher.publish(updater.store(), &[])?;
+        Ok(Server { scene, tracer, updater, publisher, dropped_inside })
+    }
+
+    /// Brings the scene to `now_s` (seconds) and publishes what changed. Time may run in any direction.
+    pub fn step(&mut self, now_s: f64) -> Result<StepReport, ServerError> {
+        let pose = self.scene.pose(now_s);
+        self.tracer.update(&self.scene, &pose);
+        let report = self.updater.step(&self.scene, &pose, &self.tracer);
+        let frames = self.publisher.publish(self.updater.store(), &report.changes)?;
+        Ok(StepReport {
+            frames,
+            traced: report.traced,
+            rays: report.rays,
+            changed: report.changes.len() as u32,
+        })
+    }
+
+    /// What a subscriber that joins now must receive, in order.
+    pub fn join(&self) -> Vec<Frame> {
+        self.publisher.join()
+    }
+
+    /// What has been published.
+    pub fn store(&self) -> &PointStore {
+        self.updater.store()
+    }
+
+    /// Points that were not laid because they lie inside geometry.
+    pub fn dropped_inside(&self) -> u32 {
+        self.dropped_inside
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.scene
+    }
+
+    /// Bytes held for each point, tracer and scene not counted.
+    pub fn bytes_per_point(&self) -> f64 {
+        self.updater.bytes_per_point()
+    }
+}

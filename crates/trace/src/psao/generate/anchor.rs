@@ -51,8 +51,8 @@ impl Anchor {
 
     /// A number that is the point's own for ever: it chooses the ray pattern.
     pub(crate) fn site(&self, instance: u32) -> u32 {
-        let [u, v] = self.barycentrics.map(u32::from);
-        hash(self.triangle_and_side, instance, u << 16 | v)
+        let [u, v] = self.barycentrics.map(u64::from);
+        hash(u64::from(self.triangle_and_side), u64::from(instance) << 32 | u << 16 | v, 0)
     }
 
     /// The anchor in the world, or `None` where the posed triangle has no normal.

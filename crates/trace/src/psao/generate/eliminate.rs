@@ -151,8 +151,8 @@ mod tests {
     use super::*;
     use crate::sampling::hash;
 
-    fn unit_square(count: u32, seed: u32) -> Vec<Candidate> {
-        let unit = |i: u32, d: u32| hash(seed, i, d) as f32 / 4_294_967_296.0;
+    fn unit_square(count: u32, seed: u64) -> Vec<Candidate> {
+        let unit = |i: u32, d: u32| hash(seed, u64::from(i), d) as f32 / 4_294_967_296.0;
         (0..count)
             .map(|i| Candidate { position: Vec3::new(unit(i, 0), 0.0, unit(i, 1)), normal: Vec3::Y })
             .collect()

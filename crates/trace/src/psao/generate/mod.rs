@@ -219,8 +219,8 @@ fn spawn(scene: &Scene, instance: usize, area: &SurfaceArea, density: f32, seed:
     let mesh = &scene.meshes[placed.mesh as usize];
     // Even the smallest thing gets a point, or it would have no visibility at all.
     let count = (area.total * f64::from(density)).ceil().max(2.0) as u32;
-    let stream = hash(seed, instance as u32, 0x5eed);
-    let unit = |i: u32, dimension: u32| f64::from(hash(stream, i, dimension)) / 4_294_967_296.0;
+    let stream = u64::from(seed) << 32 | instance as u64;
+    let unit = |i: u32, dimension: u32| f64::from(hash(stream, u64::from(i), dimension)) / 4_294_967_296.0;
     let mut spawned = Vec::with_capacity(count as usize);
     let mut triangle = 0usize;
     for i in 0..count {

@@ -14,7 +14,7 @@ use dapple_store::points::{Change, PointLayout, PointStore};
 use rayon::prelude::*;
 
 use super::generate::{Anchor, GeneratedPoints};
-use crate::{Tracer, offset_origin};
+use crate::{Tracer, count_blocked, offset_origin};
 use clusters::Clusters;
 use patterns::Patterns;
 
@@ -228,7 +228,7 @@ impl Context<'_> {
             );
             let origin_world = offset_origin(posed.position, posed.normal);
             let blocked = self.tracer.occlusion(origin_world, &directions_world, self.params.radius_m);
-            values.push(quantize(self.params.rays - blocked.count(), self.params.rays));
+            values.push(quantize(self.params.rays - count_blocked(&blocked), self.params.rays));
         }
         values
     }

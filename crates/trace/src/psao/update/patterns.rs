@@ -22,7 +22,7 @@ impl Patterns {
         let mut one = Vec::new();
         for pattern in 0..PATTERNS {
             one.clear();
-            fixed_pattern(rays, crate::sampling::hash(0x9a77, pattern, 0), &mut one);
+            fixed_pattern(rays, crate::sampling::hash(0x9a77, u64::from(pattern), 0), &mut one);
             directions.extend_from_slice(&one);
         }
         Patterns { rays: rays as usize, directions }

@@ -1,0 +1,376 @@
+//! Command-line arguments.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use dapple_scene::glam::Vec3;
+
+/// Ray-traced ambient visibility, computed once on a server and streamed to thin clients.
+#[derive(Debug, Parser)]
+#[command(name = "dapple", version, about, arg_required_else_help = true)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Run server and client along a camera path and compare the pictures with ray-traced truth.
+    #[command(after_help = EVAL_EXAMPLES)]
+    Eval(EvalArgs),
+    /// Render one picture of a scene.
+    #[command(after_help = RENDER_EXAMPLES)]
+    Render(RenderArgs),
+    /// Write a built-in scene as a GLB that any glTF viewer opens.
+    #[command(after_help = SCENE_EXAMPLES)]
+    Scene(SceneArgs),
+}
+
+const EVAL_EXAMPLES: &str = "\
+Examples:
+  dapple eval                                    a small built-in setting, under a minute on two cores
+  dapple eval room.glb --radius auto --out out/room
+  dapple eval --builtin atrium --points 512,1024 --hz 15,60 --size 960x540 --frames 8 --path path-walk
+  dapple eval --smoke                            assert the bounds that the tests assert
+
+DIR/results.json, DIR/report.html and the pictures are written; docs/evaluation.md describes the columns.";
+
+const RENDER_EXAMPLES: &str = "\
+Examples:
+  dapple render room.glb -o room.png
+  dapple render --builtin atrium --time 4 --camera eye=2,1.7,5,target=0,1,0,fov=60 --method rtao -o truth.png
+  dapple render city.glb --method psao --points 256 --radius auto --view visibility -o visibility.png
+  dapple render --builtin atrium --view error -o error.png        psao against rtao, per pixel";
+
+const SCENE_EXAMPLES: &str = "\
+Examples:
+  dapple scene                                   list the built-in scenes
+  dapple scene atrium -o atrium.glb
+  dapple scene atrium --detail 0.2 -o small.glb";
+
+/// Which scene.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct SceneChoice {
+    /// A .gltf, .glb or .obj file.
+    #[arg(value_name = "SCENE", conflicts_with = "builtin")]
+    pub(crate) scene: Option<PathBuf>,
+    /// A built-in scene (`dapple scene` lists them).
+    #[arg(long, value_name = "NAME")]
+    pub(crate) builtin: Option<String>,
+    /// Tessellation of a built-in scene, above 0 to 1.
+    #[arg(long, value_name = "D", requires = "builtin")]
+    pub(crate) detail: Option<f32>,
+    /// Animation to play: a name or an index in the file [default: the first].
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub(crate) animation: Option<String>,
+}
+
+/// How visibility is computed.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct VisibilityArgs {
+    /// Occlusion distance in metres, or `auto`: 2 % of the scene's diagonal, for files that are not in metres
+    /// (points are then counted per (radius / 0.6)² instead of per m²).
+    #[arg(long, value_name = "METRES|auto", default_value = "0.6")]
+    pub(crate) radius: Radius,
+    /// Rays a point, 1 to 256.
+    #[arg(long, value_name = "N", default_value_t = 64)]
+    pub(crate) point_rays: u32,
+    /// Change of a point's visibility (0 to 255) that is not sent.
+    #[arg(long, value_name = "T", default_value_t = 4)]
+    pub(crate) threshold: u8,
+    /// Seed of all random numbers.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u32,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct EvalArgs {
+    #[command(flatten)]
+    pub(crate) scene: SceneChoice,
+    /// Methods to compare: psao, psao-hat (the paper's kernel on the same points), rtao-R (R rays a pixel), none.
+    #[arg(long, value_delimiter = ',', value_name = "METHOD,…")]
+    pub(crate) methods: Option<Vec<Method>>,
+    /// Pictures compared, evenly spread over the path.
+    #[arg(long, value_name = "N")]
+    pub(crate) frames: Option<u32>,
+    /// Picture size in pixels.
+    #[arg(long, value_name = "WxH")]
+    pub(crate) size: Option<Size>,
+    /// Points spawned a square metre (half are kept); several are evaluated in one run.
+    #[arg(long, value_delimiter = ',', value_name = "N,…")]
+    pub(crate) points: Option<Vec<f32>>,
+    /// Server updates a second; several are evaluated in one run.
+    #[arg(long, value_delimiter = ',', value_name = "H,…")]
+    pub(crate) hz: Option<Vec<f64>>,
+    /// Camera path by name (an unknown name lists them) [default: the scene's first].
+    #[arg(long, value_name = "NAME")]
+    pub(crate) path: Option<String>,
+    /// Seconds of the path that are played [default: all of it].
+    #[arg(long, value_name = "S")]
+    pub(crate) seconds: Option<f64>,
+    /// Rays a pixel of the ray-traced truth.
+    #[arg(long, value_name = "R")]
+    pub(crate) reference_rays: Option<u32>,
+    /// Samples a pixel along each axis (2 is 4× supersampling).
+    #[arg(long, value_name = "N")]
+    pub(crate) supersample: Option<u32>,
+    #[command(flatten)]
+    pub(crate) visibility: VisibilityArgs,
+    /// Folder for results, report and pictures.
+    #[arg(long, value_name = "DIR", default_value = "out/eval")]
+    pub(crate) out: PathBuf,
+    /// Run the small built-in setting and fail if similarity or bytes leave their bounds.
+    #[arg(long, conflicts_with_all = ["scene", "builtin", "methods", "points", "hz"])]
+    pub(crate) smoke: bool,
+    /// Threads; 0 is one for each core.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) threads: usize,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RenderArgs {
+    #[command(flatten)]
+    pub(crate) scene: SceneChoice,
+    /// Where visibility comes from.
+    #[arg(long, value_enum, default_value = "psao")]
+    pub(crate) method: RenderMethod,
+    /// What is drawn.
+    #[arg(long, value_enum, default_value = "beauty")]
+    pub(crate) view: View,
+    /// Animation time in seconds.
+    #[arg(long, value_name = "T", default_value_t = 0.0)]
+    pub(crate) time: f64,
+    /// A camera of the scene by name, or one given as eye=X,Y,Z,target=X,Y,Z,fov=DEGREES (vertical)
+    /// [default: the scene's first camera path].
+    #[arg(long, value_name = "CAMERA")]
+    pub(crate) camera: Option<String>,
+    /// Picture size in pixels.
+    #[arg(long, value_name = "WxH", default_value = "1280x720")]
+    pub(crate) size: Size,
+    /// Rays a pixel (rtao).
+    #[arg(long, value_name = "R", default_value_t = 512)]
+    pub(crate) rays: u32,
+    /// Points spawned a square metre (psao); half are kept.
+    #[arg(long, value_name = "N", default_value_t = 512.0)]
+    pub(crate) points: f32,
+    /// Samples a pixel along each axis.
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub(crate) supersample: u32,
+    #[command(flatten)]
+    pub(crate) visibility: VisibilityArgs,
+    /// The PNG to write.
+    #[arg(short, long, value_name = "FILE.png")]
+    pub(crate) output: PathBuf,
+    /// Threads; 0 is one for each core.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) threads: usize,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct SceneArgs {
+    /// Which; without a name the scenes are listed.
+    pub(crate) name: Option<String>,
+    /// Tessellation, above 0 to 1.
+    #[arg(long, value_name = "D", default_value_t = 1.0)]
+    pub(crate) detail: f32,
+    /// The file to write [default: NAME.glb].
+    #[arg(short, long, value_name = "FILE.glb")]
+    pub(crate) output: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RenderMethod {
+    /// Points, reconstructed by moving least squares.
+    Psao,
+    /// Points, reconstructed by the paper's kernel.
+    PsaoHat,
+    /// Rays at every pixel: the truth.
+    Rtao,
+    /// No occlusion.
+    None,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum View {
+    /// The shaded picture.
+    Beauty,
+    /// Visibility alone, white is open.
+    Visibility,
+    /// World normals as colors.
+    Normal,
+    /// Difference between the method's visibility and rtao with --rays rays.
+    Error,
+    /// The points and their visibility over the dimmed picture.
+    Points,
+}
+
+/// A method as `eval` names it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Method {
+    Psao,
+    PsaoHat,
+    Rtao { rays: u32 },
+    None,
+}
+
+impl Method {
+    /// Whether it depends on points and server rate.
+    pub(crate) fn uses_points(self) -> bool {
+        matches!(self, Method::Psao | Method::PsaoHat)
+    }
+}
+
+impl std::fmt::Display for Method {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Method::Psao => write!(f, "psao"),
+            Method::PsaoHat => write!(f, "psao-hat"),
+            Method::Rtao { rays } => write!(f, "rtao-{rays}"),
+            Method::None => write!(f, "none"),
+        }
+    }
+}
+
+impl FromStr for Method {
+    type Err = String;
+
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        match s {
+            "psao" => Ok(Method::Psao),
+            "psao-hat" => Ok(Method::PsaoHat),
+            "none" => Ok(Method::None),
+            "rtao" => Ok(Method::Rtao { rays: 16 }),
+            _ => match s.strip_prefix("rtao-").and_then(|r| r.parse().ok()) {
+                Some(rays @ 1..=65536) => Ok(Method::Rtao { rays }),
+                _ => Err("known methods: psao, psao-hat, rtao-R with R from 1 to 65536 (rtao-16), none".into()),
+            },
+        }
+    }
+}
+
+/// Picture size.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Size {
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+}
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        let parsed = s.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+        match parsed {
+            Some((width @ 1..=16384, height @ 1..=16384)) => Ok(Size { width, height }),
+            _ => Err("write WIDTHxHEIGHT in pixels, each 1 to 16384, as in 1280x720".into()),
+        }
+    }
+}
+
+impl std::fmt::Display for Size {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}x{}", self.width, self.height)
+    }
+}
+
+/// Occlusion distance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Radius {
+    Auto,
+    Metres(f32),
+}
+
+impl FromStr for Radius {
+    type Err = String;
+
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        if s == "auto" {
+            return Ok(Radius::Auto);
+        }
+        match s.parse::<f32>() {
+            Ok(m) if m.is_finite() && m > 0.0 => Ok(Radius::Metres(m)),
+            _ => Err("write a length in metres above 0, or auto".into()),
+        }
+    }
+}
+
+/// A camera given on the command line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct CameraText {
+    pub(crate) eye: Vec3,
+    pub(crate) target: Vec3,
+    pub(crate) fov_degrees: f32,
+}
+
+impl FromStr for CameraText {
+    type Err = String;
+
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        let help = || format!("'{s}' is no camera: write eye=X,Y,Z,target=X,Y,Z,fov=DEGREES");
+        // Commas separate both numbers and keys: a part with `=` opens the next key.
+        let mut groups: Vec<(&str, Vec<f32>)> = Vec::new();
+        for part in s.split(',') {
+            let number = match part.split_once('=') {
+                Some((key, number)) => {
+                    groups.push((key.trim(), Vec::new()));
+                    number
+                }
+                None => part,
+            };
+            let number = number.trim().parse::<f32>().ok().filter(|n| n.is_finite()).ok_or_else(help)?;
+            groups.last_mut().ok_or_else(help)?.1.push(number);
+        }
+        let (mut eye, mut target, mut fov) = (None, None, 60.0f32);
+        for (key, numbers) in groups {
+            match (key, numbers.as_slice()) {
+                ("eye", &[x, y, z]) => eye = Some(Vec3::new(x, y, z)),
+                ("target", &[x, y, z]) => target = Some(Vec3::new(x, y, z)),
+                ("fov", &[degrees]) if degrees > 0.0 && degrees < 180.0 => fov = degrees,
+                _ => return Err(help()),
+            }
+        }
+        match (eye, target) {
+            (Some(eye), Some(target)) if eye != target => Ok(CameraText { eye, target, fov_degrees: fov }),
+            _ => Err(help()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn cameras_are_read_in_any_order() {
+        let expected = CameraText { eye: Vec3::new(1.0, -2.5, 30.0), target: Vec3::ZERO, fov_degrees: 45.0 };
+        for text in ["eye=1,-2.5,3e1,target=0,0,0,fov=45", "fov=45,target=0,0,0,eye=1,-2.5,30"] {
+            assert_eq!(text.parse(), Ok(expected), "{text}");
+        }
+        for text in ["", "eye=1,2,target=0,0,0", "eye=0,0,0,target=0,0,0", "eye=1,2,3", "eye=a,b,c,target=0,0,0", "fov=190"] {
+            assert!(text.parse::<CameraText>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn sizes_methods_and_radii_refuse_nonsense() {
+        assert_eq!("640x360".parse(), Ok(Size { width: 640, height: 360 }));
+        for text in ["0x1", "640", "640x", "99999x1", "-1x2"] {
+            assert!(text.parse::<Size>().is_err(), "{text}");
+        }
+        assert_eq!("rtao-512".parse(), Ok(Method::Rtao { rays: 512 }));
+        for text in ["rtao-0", "rtao-x", "ssao", ""] {
+            assert!(text.parse::<Method>().is_err(), "{text}");
+        }
+        assert_eq!("auto".parse(), Ok(Radius::Auto));
+        for text in ["0", "-1", "nan", "inf", "wide"] {
+            assert!(text.parse::<Radius>().is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,40 @@
+//! `dapple eval`: server and client in one process along a camera path, against ray-traced truth.
+
+mod report;
+mod results;
+mod run;
+mod settings;
+mod smoke;
+mod table;
+
+use anyhow::Result;
+
+use crate::args::EvalArgs;
+use crate::picture::write_file;
+use crate::source;
+
+use settings::Settings;
+
+/// Runs an evaluation and writes results, report and pictures.
+pub(crate) fn run(args: &EvalArgs) -> Result<()> {
+    let loaded = source::load(&args.scene, Some(settings::DEFAULT_SCENE))?;
+    let settings = Settings::new(args, &loaded)?;
+    std::fs::create_dir_all(&args.out)
+        .map_err(|e| anyhow::anyhow!("cannot create the folder {}: {e}", args.out.display()))?;
+    println!("{}", settings.summary(&loaded));
+
+    let results = run::evaluate(&loaded, &settings, &args.out)?;
+
+    println!("\n{}", table::text(&results));
+    let json = serde_json::to_vec_pretty(&results)?;
+    write_file(&args.out.join("results.json"), &json)?;
+    let report = args.out.join("report.html");
+    write_file(&report, report::html(&results).as_bytes())?;
+    let shown = std::fs::canonicalize(&report).unwrap_or(report);
+    println!("report: {}", shown.display());
+    if args.smoke {
+        smoke::check(&results)?;
+        println!("smoke: all bounds hold");
+    }
+    Ok(())
+}

@@ -1,0 +1,23 @@
+//! `dapple scene`: lists built-in scenes and writes them.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use dapple_scene::builtin;
+
+use crate::args::SceneArgs;
+use crate::picture::write_file;
+
+pub(crate) fn run(args: &SceneArgs) -> Result<()> {
+    let Some(name) = &args.name else {
+        for scene in builtin::BUILTINS {
+            println!("{:10} {}", scene.name, scene.summary);
+        }
+        return Ok(());
+    };
+    let bytes = builtin::glb(name, args.detail)?;
+    let output = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}.glb")));
+    write_file(&output, &bytes)?;
+    println!("wrote {} ({:.1} MB)", output.display(), bytes.len() as f64 / 1e6);
+    Ok(())
+}

@@ -1,0 +1,135 @@
+//! Where scenes come from: files and the built-in ones.
+
+use std::io::{Error, ErrorKind, Read};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::{Context, Result, bail};
+use dapple_scene::{CameraPath, Files, Scene, builtin};
+
+use crate::args::{CameraText, Radius, SceneChoice, VisibilityArgs};
+
+/// The largest scene file that is read.
+const MAX_SCENE_BYTES: u64 = 4 << 30;
+
+/// A loaded scene and what a user should call it.
+pub(crate) struct Loaded {
+    pub(crate) scene: Arc<Scene>,
+    pub(crate) title: String,
+}
+
+/// Loads what the arguments name; `fallback` is the built-in scene and detail used when they name nothing.
+pub(crate) fn load(choice: &SceneChoice, fallback: Option<(&str, f32)>) -> Result<Loaded> {
+    let (mut scene, title) = match (&choice.scene, &choice.builtin, fallback) {
+        (Some(path), _, _) => (load_file(path)?, path.display().to_string()),
+        (None, Some(name), _) => load_builtin(name, choice.detail.unwrap_or(1.0))?,
+        (None, None, Some((name, detail))) => load_builtin(name, detail)?,
+        (None, None, None) => bail!("no scene given: name a .gltf, .glb or .obj file, or --builtin atrium"),
+    };
+    if let Some(animation) = &choice.animation {
+        scene.active_animation = Some(find_animation(&scene, animation)?);
+    }
+    for warning in &scene.warnings {
+        tracing::warn!("{}: {}", title, warning.message);
+    }
+    if scene.triangle_count() == 0 {
+        bail!("{title} has no triangles: there is nothing to light");
+    }
+    Ok(Loaded { scene: Arc::new(scene), title })
+}
+
+fn load_builtin(name: &str, detail: f32) -> Result<(Scene, String)> {
+    let bytes = builtin::glb(name, detail)?;
+    let scene = dapple_scene::load(&format!("{name}.glb"), &bytes, &dapple_scene::NoFiles)
+        .with_context(|| format!("the built-in scene {name} does not load"))?;
+    Ok((scene, format!("built-in {name}, detail {detail}")))
+}
+
+fn load_file(path: &Path) -> Result<Scene> {
+    let bytes = read_limited(path, MAX_SCENE_BYTES)
+        .with_context(|| format!("cannot read the scene {}", path.display()))?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+    Ok(dapple_scene::load(&name, &bytes, &Folder(folder))?)
+}
+
+fn find_animation(scene: &Scene, wanted: &str) -> Result<u32> {
+    let by_name = scene.animations.iter().position(|a| a.name == wanted);
+    let by_index = wanted.parse::<usize>().ok().filter(|&i| i < scene.animations.len());
+    match by_name.or(by_index) {
+        Some(index) => Ok(index as u32),
+        None if scene.animations.is_empty() => bail!("--animation {wanted}: the scene has no animations"),
+        None => {
+            let known: Vec<&str> = scene.animations.iter().map(|a| a.name.as_str()).collect();
+            bail!("--animation {wanted}: the scene's animations are {}", known.join(", "))
+        }
+    }
+}
+
+/// The camera path of that name, or the scene's first.
+pub(crate) fn find_path(scene: &Scene, wanted: Option<&str>) -> Result<CameraPath> {
+    let mut paths = scene.camera_paths();
+    let Some(wanted) = wanted else { return Ok(paths.swap_remove(0)) };
+    match paths.iter().position(|p| p.name == wanted) {
+        Some(index) => Ok(paths.swap_remove(index)),
+        None => {
+            let known: Vec<&str> = paths.iter().map(|p| p.name.as_str()).collect();
+            bail!("there is no camera path {wanted}; this scene's are {}", known.join(", "))
+        }
+    }
+}
+
+/// A camera given as text or by the name of one of the scene's camera paths.
+pub(crate) fn find_camera(scene: &Scene, text: Option<&str>, time_s: f64) -> Result<dapple_scene::PosedCamera> {
+    if let Some(text) = text.filter(|t| t.contains('=')) {
+        let camera: CameraText = text.parse().map_err(anyhow::Error::msg)?;
+        return Ok(dapple_scene::PosedCamera::look_at(
+            camera.eye,
+            camera.target,
+            camera.fov_degrees.to_radians(),
+        ));
+    }
+    let path = find_path(scene, text).context(
+        "--camera takes a camera path's name or eye=X,Y,Z,target=X,Y,Z,fov=DEGREES",
+    )?;
+    Ok(path.camera(scene, &scene.pose(time_s)))
+}
+
+/// The occlusion distance in metres, and the factor on points per m² that goes with it.
+pub(crate) fn resolve_radius(scene: &Scene, args: &VisibilityArgs) -> (f32, f32) {
+    match args.radius {
+        Radius::Metres(m) => (m, 1.0),
+        Radius::Auto => {
+            let radius = scene.auto_radius_m();
+            (radius, (0.6 / radius) * (0.6 / radius))
+        }
+    }
+}
+
+/// Reads files beside a scene.
+struct Folder(PathBuf);
+
+impl Files for Folder {
+    fn read(&self, uri: &str, limit_bytes: u64) -> std::io::Result<Vec<u8>> {
+        read_limited(&self.0.join(uri), limit_bytes)
+    }
+}
+
+fn read_limited(path: &Path, limit_bytes: u64) -> std::io::Result<Vec<u8>> {
+    let file = std::fs::File::open(path)?;
+    let metadata = file.metadata()?;
+    if metadata.is_dir() {
+        return Err(Error::new(ErrorKind::IsADirectory, "it is a folder"));
+    }
+    if metadata.len() > limit_bytes {
+        let message = format!("it has {} bytes, more than the limit of {limit_bytes}", metadata.len());
+        return Err(Error::new(ErrorKind::FileTooLarge, message));
+    }
+    // Pipes and the like have no length of their own.
+    let mut bytes = Vec::with_capacity(metadata.len() as usize);
+    file.take(limit_bytes + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > limit_bytes {
+        return Err(Error::new(ErrorKind::FileTooLarge, format!("it has more than {limit_bytes} bytes")));
+    }
+    Ok(bytes)
+}
