@@ -1,1 +1,17 @@
-//! dapple-trace
+//! The server's rays: what blocks what, and the visibility that follows from it.
+//!
+//! [`Tracer`] answers occlusion and closest-hit queries on a posed scene, [`sampling`] chooses directions that
+//! depend on nothing but a seed and a site, and [`rtao`] joins the two into ray-traced visibility, the truth
+//! that every other method is compared with.
+//!
+//! Nothing here owns a thread pool, a clock or a random state: parallel loops run in the caller's rayon pool and
+//! give the same bits on any number of threads.
+
+pub mod bvh;
+pub mod rtao;
+pub mod sampling;
+
+#[cfg(test)]
+mod test_support;
+
+pub use bvh::{BlockedMask, Hit, MAX_DIRECTIONS, Ray, Tracer, count_blocked, offset_origin};

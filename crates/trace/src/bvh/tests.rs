@@ -1,0 +1,475 @@
+//! The tracer against a loop over all triangles, and against leaks, flaws and large numbers.
+
+use dapple_scene::glam::{Affine2, Affine3A, Mat3, Quat, Vec2, Vec3, Vec4};
+use dapple_scene::{AlphaMode, Filter, Image, Mesh, Pose, Scene, Texture, TextureRef, Wrap};
+use proptest::prelude::*;
+
+use super::triangle::{MeshRay, Triangle, intersect};
+use super::{Hit, Ray, Tracer, count_blocked, offset_origin};
+use crate::test_support::{Random, cube, deform, joined, mesh, quad, scene, scene_of, sphere};
+
+/// Where [`Tracer::closest_hit`] should be: a loop over everything, in world space, in `f64`, by another formula
+/// (Cramer's rule). The second value is how far (in barycentrics, or relative t) the nearest decision was from
+/// tipping: only rays with a clear answer are compared.
+fn brute_force(scene: &Scene, pose: &Pose, ray: &Ray) -> (Option<Hit>, f64) {
+    type V = [f64; 3];
+    let v = |a: Vec3| -> V { a.to_array().map(f64::from) };
+    let sub = |a: V, b: V| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    let cross = |a: V, b: V| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let dot = |a: V, b: V| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let (mut best, mut best_t, mut margin) = (None, f64::INFINITY, 1.0_f64);
+    for (i, instance) in scene.instances.iter().enumerate().filter(|(_, i)| i.casts) {
+        let (m, posed) = (&scene.meshes[instance.mesh as usize], &pose.instances[i]);
+        let positions = posed.deformed.as_ref().map_or(&m.positions, |d| &d.positions);
+        let map = &posed.world_from_mesh;
+        let (x, y, z) = (v(map.matrix3.x_axis.into()), v(map.matrix3.y_axis.into()), v(map.matrix3.z_axis.into()));
+        let (mirrored, offset) = (dot(x, cross(y, z)) < 0.0, v(map.translation.into()));
+        let world = |p: Vec3| {
+            let p = v(p);
+            [0, 1, 2].map(|k| x[k] * p[0] + y[k] * p[1] + z[k] * p[2] + offset[k])
+        };
+        for (j, t) in m.triangles.iter().enumerate() {
+            let [a, b, c] = t.map(|k| world(positions[k as usize]));
+            let (e1, e2, d) = (sub(b, a), sub(c, a), v(ray.direction_world));
+            let p = cross(d, e2);
+            let det = dot(e1, p);
+            let s = sub(v(ray.origin_world), a);
+            let q = cross(s, e1);
+            let (wb, wc, t) = (dot(s, p) / det, dot(d, q) / det, dot(e2, q) / det);
+            if !t.is_finite() {
+                continue;
+            }
+            let wa = 1.0 - wb - wc;
+            let inside = wa.min(wb).min(wc);
+            let sine = det.abs() / (dot(e1, e1) * dot(e2, e2)).sqrt();
+            let t_max = f64::from(ray.t_max);
+            let relative = (t - t_max).abs() / t_max.min(1e9);
+            // A decision counts if the others do not settle the matter anyway.
+            if t > -1e-4 && t < best_t.min(t_max) * 1.001 + 1e-3 && inside > -1e-3 {
+                margin = margin.min(inside.abs().min(relative).min(t.abs()).min((t - best_t).abs()) * sine.min(1.0));
+            }
+            if inside >= 0.0 && t > 0.0 && t <= t_max && t < best_t {
+                best_t = t;
+                best = Some(Hit {
+                    t: t as f32,
+                    instance: i as u32,
+                    triangle: j as u32,
+                    barycentrics: Vec3::new(wa as f32, wb as f32, wc as f32),
+                    // det > 0: against the normal of the transformed corners, which mirroring turns over.
+                    back_face: (det < 0.0) != mirrored,
+                });
+            }
+        }
+    }
+    (best, margin)
+}
+
+/// Triangles of all sizes, some without area, some doubled.
+fn soup(random: &mut Random, triangles: usize, size: f32) -> Mesh {
+    let (mut positions, mut indices) = (Vec::new(), Vec::new());
+    for i in 0..triangles {
+        let base = positions.len() as u32;
+        let center = random.vector();
+        let s = size * (0.05 + random.next());
+        positions.extend([0, 1, 2].map(|_| center + s * random.vector()));
+        indices.push(match i % 17 {
+            5 => [base, base, base + 1],
+            11 => [0, 1, 2],
+            _ => [base, base + 1, base + 2],
+        });
+    }
+    mesh(positions, indices)
+}
+
+fn placement(random: &mut Random, scale: f32) -> Affine3A {
+    let rotation = Quat::from_axis_angle(random.direction(), 6.0 * random.next());
+    let mut s = Vec3::splat(scale) * (0.4 + Vec3::new(random.next(), random.next(), random.next()));
+    if random.next() < 0.5 {
+        s.x = -s.x;
+    }
+    Affine3A::from_scale_rotation_translation(s, rotation, 1.5 * random.vector())
+}
+
+/// Compares all queries with each other and with the loop; returns how many rays were clear enough to compare.
+fn check(tracer: &Tracer, scene: &Scene, pose: &Pose, random: &mut Random, points: u32) -> u32 {
+    let mut compared = 0;
+    for _ in 0..points {
+        let origin = 2.0 * random.vector();
+        let t_max = if random.next() < 0.3 { f32::INFINITY } else { 0.1 + 3.0 * random.next() };
+        let directions: Vec<Vec3> = (0..1 + (150.0 * random.next()) as u32).map(|_| random.direction()).collect();
+        let blocked = tracer.occlusion(origin, &directions, t_max);
+        for (i, &direction_world) in directions.iter().enumerate() {
+            let ray = Ray { origin_world: origin, direction_world, t_max };
+            let bit = blocked[i / 64] >> (i % 64) & 1 != 0;
+            assert_eq!(bit, tracer.occluded(&ray), "direction {i} of {origin}, t_max {t_max}");
+            let hit = tracer.closest_hit(&ray);
+            assert_eq!(bit, hit.is_some());
+            let (expected, margin) = brute_force(scene, pose, &ray);
+            if margin < 1e-5 {
+                continue;
+            }
+            compared += 1;
+            match (hit, expected) {
+                (None, None) => {}
+                (Some(h), Some(e)) => {
+                    let same_corners = {
+                        let m = &scene.meshes[scene.instances[e.instance as usize].mesh as usize];
+                        m.triangles[h.triangle as usize] == m.triangles[e.triangle as usize]
+                    };
+                    assert!(h.instance == e.instance && same_corners, "{h:?} {e:?} {margin}");
+                    assert!((h.t - e.t).abs() <= 1e-4 * (1.0 + e.t), "{h:?} {e:?} {margin}");
+                    assert!(h.barycentrics.abs_diff_eq(e.barycentrics, 0.02), "{h:?} {e:?} {margin}");
+                    assert_eq!(h.back_face, e.back_face);
+                }
+                _ => panic!("{hit:?} instead of {expected:?}, margin {margin}, {ray:?}"),
+            }
+        }
+    }
+    compared
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(24) })]
+
+    #[test]
+    fn agrees_with_brute_force(seed in any::<u32>(), triangles in 1_usize..120, instances in 1_usize..6) {
+        let mut random = Random(seed >> 1);
+        let meshes = vec![soup(&mut random, triangles, 0.5), soup(&mut random, 7, 1.0)];
+        let placed: Vec<_> = (0..instances).map(|i| (i as u32 % 2, placement(&mut random, 1.0))).collect();
+        let (mut scene, mut pose) = scene(meshes, &placed);
+        if instances > 2 {
+            scene.instances[1].casts = false;
+            let moved = scene.meshes[0].positions.iter().map(|p| *p * 1.2).collect();
+            deform(&mut pose, 2, moved);
+        }
+        let mut tracer = Tracer::new(&scene, &pose);
+        let compared = check(&tracer, &scene, &pose, &mut random, 8);
+        prop_assert!(compared > 0);
+
+        // Instances move; the deformed one's vertices too, by little (refit) and by much (rebuild).
+        for shift in [0.1, 3.0] {
+            for instance in &mut pose.instances {
+                instance.world_from_mesh = placement(&mut random, 1.0);
+            }
+            if instances > 2 {
+                let m = &scene.meshes[0];
+                let moved = m.positions.iter().map(|p| *p + shift * random.vector()).collect();
+                deform(&mut pose, 2, moved);
+            }
+            tracer.update(&scene, &pose);
+            check(&tracer, &scene, &pose, &mut random, 4);
+        }
+    }
+
+    #[test]
+    fn any_numbers_are_survived(
+        seed in any::<u32>(),
+        exponent in -44_i32..39,
+        scale_exponent in -44_i32..39,
+        flat in any::<bool>(),
+    ) {
+        let mut random = Random(seed >> 1);
+        let size = libm::powf(10.0, exponent as f32);
+        let mut m = soup(&mut random, 60, 0.5);
+        for p in &mut m.positions {
+            *p *= size;
+        }
+        let scale = libm::powf(10.0, scale_exponent as f32);
+        let s = if flat { Vec3::new(scale, 0.0, scale) } else { Vec3::splat(scale) };
+        let map = Affine3A::from_scale_rotation_translation(s, Quat::IDENTITY, random.vector() * size);
+        let (scene, mut pose) = scene(vec![m], &[(0, map), (0, Affine3A::IDENTITY)]);
+        let mut tracer = Tracer::new(&scene, &pose);
+        deform(&mut pose, 1, scene.meshes[0].positions.iter().map(|p| *p / size).collect());
+        for _ in 0..2 {
+            for _ in 0..20 {
+                let origin_world = random.vector() * size;
+                let directions: Vec<Vec3> = (0..40).map(|_| random.direction()).collect();
+                let blocked = tracer.occlusion(origin_world, &directions, f32::INFINITY);
+                for (i, &direction_world) in directions.iter().enumerate() {
+                    let ray = Ray { origin_world, direction_world, t_max: f32::INFINITY };
+                    let hit = tracer.closest_hit(&ray);
+                    prop_assert_eq!(hit.is_some(), blocked[0] >> i & 1 != 0);
+                    if let Some(hit) = hit {
+                        prop_assert!(!hit.t.is_nan() && !hit.barycentrics.is_nan());
+                    }
+                }
+            }
+            tracer.update(&scene, &pose);
+        }
+    }
+}
+
+#[test]
+fn closed_sphere_does_not_leak() {
+    // Rays from inside through every vertex and along every edge; origins on and off the axes of symmetry.
+    for (center, radius) in [(Vec3::ZERO, 1.0), (Vec3::new(3.1, -7.7, 12.9), 0.37), (Vec3::splat(900.0), 5.0)] {
+        let m = sphere(center, radius, 24, 36);
+        let (scene, pose) = scene_of(m.clone());
+        let tracer = Tracer::new(&scene, &pose);
+        for origin in [center, center + radius * Vec3::new(0.3, 0.0, 0.0), center + radius * Vec3::new(0.31, -0.2, 0.43)]
+        {
+            let mut directions = Vec::new();
+            for t in &m.triangles {
+                let [a, b, c] = t.map(|i| m.positions[i as usize] - origin);
+                directions.extend([a, 0.5 * (a + b), 0.3 * b + 0.7 * c, 0.9 * c + 0.1 * a, a + b + c]);
+            }
+            for chunk in directions.chunks(256) {
+                // Not normalized first, so that the ray goes exactly through the vertex; then unit ones.
+                for d in chunk {
+                    let ray = Ray { origin_world: origin, direction_world: *d, t_max: f32::INFINITY };
+                    assert!(tracer.occluded(&ray), "{d} from {origin} escapes");
+                    assert!(tracer.closest_hit(&ray).is_some_and(|h| h.back_face && (0.5..2.0).contains(&h.t)));
+                }
+                let unit: Vec<Vec3> = chunk.iter().map(|d| d.normalize()).collect();
+                assert_eq!(count_blocked(&tracer.occlusion(origin, &unit, 10.0 * radius)) as usize, unit.len());
+            }
+        }
+    }
+}
+
+#[test]
+fn single_triangles_are_exact_at_their_edges() {
+    // Two triangles share an edge through the rays: each ray meets at least one of them.
+    let mut random = Random(5);
+    for _ in 0..20_000 {
+        let [a, b] = [0, 1].map(|_| random.vector());
+        let (c, d) = (random.vector(), random.vector());
+        let on_edge = a + (b - a) * random.next();
+        let origin = 3.0 * random.direction();
+        let side = |p: Vec3| (b - a).cross(p - a).dot((b - a).cross(on_edge - origin));
+        // c and d on opposite sides of the edge as seen from the origin.
+        let normal = (on_edge - origin).cross(b - a);
+        if normal.dot(c - a) * normal.dot(d - a) > -0.01 || side(c).is_nan() {
+            continue;
+        }
+        let ray = MeshRay::new(origin, on_edge - origin, f32::INFINITY).unwrap();
+        let hit = [[a, b, c], [b, a, d]].map(|t| {
+            let corners = t.map(|p| p.to_array());
+            intersect(&ray, &Triangle { corners, id: 0, alpha: super::alpha::OPAQUE }).is_some()
+        });
+        assert!(hit[0] || hit[1]);
+    }
+}
+
+#[test]
+fn t_max_and_faces() {
+    // Counter-clockwise seen from above.
+    let floor = quad(Vec3::new(-1.0, 0.0, 1.0), Vec3::new(1.0, 0.0, 1.0), Vec3::new(1.0, 0.0, -1.0), Vec3::new(-1.0, 0.0, -1.0));
+    let mirror = Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0));
+    for map in [Affine3A::IDENTITY, mirror] {
+        let (scene, pose) = scene(vec![floor.clone()], &[(0, map)]);
+        let tracer = Tracer::new(&scene, &pose);
+        for (y, back_face) in [(2.0, false), (-2.0, true)] {
+            let ray = |t_max| Ray {
+                origin_world: Vec3::new(0.2, y, 0.1),
+                direction_world: Vec3::new(0.0, -y, 0.0).normalize(),
+                t_max,
+            };
+            let hit = tracer.closest_hit(&ray(2.0)).unwrap();
+            assert_eq!((hit.t, hit.back_face, hit.instance), (2.0, back_face, 0));
+            assert!(tracer.occluded(&ray(2.0)));
+            assert!(!tracer.occluded(&ray(1.999)));
+            assert!(tracer.closest_hit(&ray(1.999)).is_none());
+            for t_max in [0.0, -1.0, f32::NAN] {
+                assert!(!tracer.occluded(&ray(t_max)));
+                assert!(tracer.closest_hit(&ray(t_max)).is_none());
+                assert_eq!(tracer.occlusion(ray(1.0).origin_world, &[Vec3::Y, Vec3::NEG_Y], t_max), [0; 4]);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_surface_does_not_block_its_own_rays() {
+    // A rotated, stretched ball at the origin, and 1 km from it: convex, so that every ray leaves.
+    let m = sphere(Vec3::ZERO, 1.0, 20, 30);
+    for (translation, scale) in [(Vec3::ZERO, 1.0), (Vec3::new(1000.0, 300.0, -800.0), 1.0), (Vec3::splat(50.0), 20.0)] {
+        let map = Affine3A::from_scale_rotation_translation(
+            Vec3::new(1.0, 0.6, 1.4) * scale,
+            Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 1.1),
+            translation,
+        );
+        let (scene, pose) = scene(vec![m.clone()], &[(0, map)]);
+        let tracer = Tracer::new(&scene, &pose);
+        let mut random = Random(9);
+        for t in &m.triangles {
+            let [a, b, c] = t.map(|i| map.transform_point3(m.positions[i as usize]));
+            let n = (Mat3::from(map.matrix3).inverse().transpose()
+                * {
+                    let [a, b, c] = t.map(|i| m.positions[i as usize]);
+                    (b - a).cross(c - a)
+                })
+            .normalize();
+            let (u, v) = (random.next(), random.next());
+            let p = a + (b - a) * (u * (1.0 - v)) + (c - a) * (u * v);
+            let directions: Vec<Vec3> = (0..64)
+                .map(|_| {
+                    let d = random.direction();
+                    if d.dot(n) < 0.0 { -d } else { d }
+                })
+                .collect();
+            assert_eq!(tracer.occlusion(offset_origin(p, n), &directions, f32::INFINITY), [0; 4]);
+            // And from below nothing gets out: the lift is no hole.
+            let inside: Vec<Vec3> = directions.iter().map(|d| -*d).collect();
+            let blocked = tracer.occlusion(offset_origin(p, -n), &inside, f32::INFINITY);
+            assert_eq!(count_blocked(&blocked), 64);
+        }
+    }
+}
+
+#[test]
+fn nothing_to_hit() {
+    let directions = [Vec3::X, Vec3::Y, Vec3::ZERO, Vec3::NAN];
+    let flat = Affine3A::from_scale(Vec3::new(1.0, 0.0, 1.0));
+    let nan = Affine3A::from_translation(Vec3::NAN);
+    let broken = mesh(vec![Vec3::ZERO, Vec3::NAN, Vec3::X], vec![[0, 1, 2], [0, 1, 9]]);
+    for (scene, pose) in [
+        (Scene::default(), Pose::default()),
+        scene_of(Mesh::default()),
+        scene(vec![cube()], &[]),
+        scene(vec![cube()], &[(0, flat), (0, nan)]),
+        scene(vec![cube()], &[(7, Affine3A::IDENTITY)]),
+        scene_of(broken),
+    ] {
+        let mut tracer = Tracer::new(&scene, &pose);
+        for _ in 0..2 {
+            for d in directions {
+                let ray = Ray { origin_world: Vec3::splat(0.5), direction_world: d, t_max: f32::INFINITY };
+                assert!(!tracer.occluded(&ray));
+                assert!(tracer.closest_hit(&ray).is_none());
+            }
+            assert_eq!(tracer.occlusion(Vec3::splat(0.5), &directions, f32::INFINITY), [0; 4]);
+            assert_eq!(tracer.occlusion(Vec3::splat(0.5), &[], 1.0), [0; 4]);
+            tracer.update(&scene, &pose);
+        }
+    }
+    // The same query does hit what is there, and directions that are none are not blocked.
+    let (scene, pose) = scene_of(cube());
+    let tracer = Tracer::new(&scene, &pose);
+    assert_eq!(tracer.occlusion(Vec3::splat(0.4), &directions, f32::INFINITY), [0b11, 0, 0, 0]);
+    assert_eq!(tracer.occlusion(Vec3::NAN, &directions, f32::INFINITY), [0; 4]);
+    let many = vec![Vec3::X; 300];
+    assert_eq!(tracer.occlusion(Vec3::splat(0.4), &many, 2.0), [u64::MAX; 4]);
+}
+
+#[test]
+fn holes_let_rays_through() {
+    let mut floor =
+        quad(Vec3::new(0.0, 0.0, 1.0), Vec3::new(1.0, 0.0, 1.0), Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 0.0, 0.0));
+    floor.uvs[1] = vec![Vec2::new(0.0, 1.0), Vec2::new(1.0, 1.0), Vec2::new(1.0, 0.0), Vec2::new(0.0, 0.0)];
+    let (mut scene, pose) = scene_of(floor);
+    // Alpha 255 and 100 left and right.
+    scene.images =
+        vec![Image { name: String::new(), width: 2, height: 1, rgba8: vec![[0, 0, 0, 255], [0, 0, 0, 100]] }];
+    scene.textures =
+        vec![Texture { image: 0, wrap_u: Wrap::Repeat, wrap_v: Wrap::Repeat, filter: Filter::Nearest }];
+    let blocked = |scene: &Scene| {
+        let tracer = Tracer::new(scene, &pose);
+        [0.25, 0.75].map(|x| {
+            let origin_world = Vec3::new(x, 1.0, 0.4);
+            let ray = Ray { origin_world, direction_world: Vec3::NEG_Y, t_max: 2.0 };
+            let hit = tracer.occluded(&ray);
+            assert_eq!(tracer.closest_hit(&ray).is_some(), hit);
+            assert_eq!(tracer.occlusion(origin_world, &[Vec3::NEG_Y; 64], 2.0)[0], if hit { u64::MAX } else { 0 });
+            hit
+        })
+    };
+    let texture = TextureRef { texture: 0, uv_set: 1, image_from_uv: Affine2::IDENTITY };
+    let material = |f: &dyn Fn(&mut dapple_scene::Material)| {
+        let mut s = scene.clone();
+        s.materials[0].base_color_texture = Some(texture);
+        f(&mut s.materials[0]);
+        s
+    };
+    assert_eq!(blocked(&material(&|_| ())), [true, true], "opaque ignores alpha");
+    assert_eq!(blocked(&material(&|m| m.alpha_mode = AlphaMode::Blend)), [true, false]);
+    assert_eq!(blocked(&material(&|m| m.alpha_mode = AlphaMode::Mask { cutoff: 0.3 })), [true, true]);
+    let masked = material(&|m| {
+        m.alpha_mode = AlphaMode::Mask { cutoff: 0.5 };
+        m.base_color_texture.as_mut().unwrap().image_from_uv = Affine2::from_translation(Vec2::new(0.5, 0.0));
+    });
+    assert_eq!(blocked(&masked), [false, true], "image_from_uv");
+    let faded = material(&|m| {
+        m.alpha_mode = AlphaMode::Blend;
+        m.base_color_factor.w = 0.4;
+    });
+    assert_eq!(blocked(&faded), [false, false], "factor");
+    let mut plain = faded.clone();
+    plain.materials[0].base_color_texture = None;
+    assert_eq!(blocked(&plain), [false, false], "no texture");
+    plain.materials[0].base_color_factor.w = 0.5;
+    assert_eq!(blocked(&plain), [true, true], "at the cutoff");
+    let mut colored = plain.clone();
+    colored.materials[0].base_color_factor.w = 1.0;
+    colored.meshes[0].colors = [0.0, 1.0, 1.0, 0.0].map(|a| Vec4::new(1.0, 1.0, 1.0, a)).to_vec();
+    assert_eq!(blocked(&colored), [false, true], "vertex colour");
+    let mut far = material(&|m| m.alpha_mode = AlphaMode::Blend);
+    for uv in &mut far.meshes[0].uvs[1] {
+        *uv *= f32::MAX;
+    }
+    assert_eq!(blocked(&far), [true, true], "coordinates too large to look up are solid");
+    let mut torn = material(&|m| m.alpha_mode = AlphaMode::Blend);
+    torn.images[0].rgba8.clear();
+    assert_eq!(blocked(&torn), [true, true], "an image without its texels is none");
+}
+
+#[test]
+fn casts_false_is_not_hit_and_may_change_form() {
+    let (mut scene, mut pose) = scene(vec![cube()], &[(0, Affine3A::IDENTITY), (0, Affine3A::from_translation(Vec3::X * 5.0))]);
+    let ray = Ray { origin_world: Vec3::new(-1.0, 0.4, 0.3), direction_world: Vec3::X, t_max: f32::INFINITY };
+    let mut tracer = Tracer::new(&scene, &pose);
+    assert_eq!(tracer.closest_hit(&ray).map(|h| (h.instance, h.t)), Some((0, 1.0)));
+    scene.instances[0].casts = false;
+    tracer.update(&scene, &pose);
+    assert_eq!(tracer.closest_hit(&ray).map(|h| (h.instance, h.t)), Some((1, 6.0)));
+    // Rigid, then deformed, then rigid again.
+    deform(&mut pose, 1, scene.meshes[0].positions.iter().map(|p| *p + Vec3::X).collect());
+    tracer.update(&scene, &pose);
+    assert_eq!(tracer.closest_hit(&ray).map(|h| (h.instance, h.t)), Some((1, 7.0)));
+    pose.instances[1].deformed = None;
+    tracer.update(&scene, &pose);
+    assert_eq!(tracer.closest_hit(&ray).map(|h| h.t), Some(6.0));
+}
+
+#[test]
+fn equal_distances_go_to_the_lowest_instance_and_triangle() {
+    let two = joined([cube(), cube()]);
+    let (scene, pose) = scene(vec![cube(), two], &[(1, Affine3A::IDENTITY), (0, Affine3A::IDENTITY), (1, Affine3A::IDENTITY)]);
+    let tracer = Tracer::new(&scene, &pose);
+    let mut random = Random(1);
+    for _ in 0..500 {
+        let direction_world = random.direction();
+        let hit = tracer.closest_hit(&Ray { origin_world: Vec3::splat(0.45), direction_world, t_max: 9.0 }).unwrap();
+        assert!(hit.instance == 0 && hit.triangle < 12, "{hit:?}");
+    }
+}
+
+#[test]
+fn trees_do_not_depend_on_threads() {
+    let mut random = Random(3);
+    let m = soup(&mut random, 90_000, 0.02);
+    let (scene, pose) = scene_of(m);
+    let hits = [1, 2, 3].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let tracer = pool.install(|| Tracer::new(&scene, &pose));
+        tracer.leaf_orders()
+    });
+    assert!(hits[0] == hits[1] && hits[1] == hits[2]);
+    assert_eq!(hits[0][0].len(), 90_000);
+}
+
+#[test]
+fn spiteful_spacing_stays_shallow() {
+    // Each triangle a tenth the size of the last: the heuristic alone would peel off one at a time.
+    let mut positions = Vec::new();
+    for i in 0..3000 {
+        let s = libm::exp2f(126.0 - 0.08 * i as f32);
+        positions.extend([Vec3::new(s, 0.0, 0.0), Vec3::new(s, 0.1 * s, 0.0), Vec3::new(s, 0.0, 0.1 * s)]);
+    }
+    let triangles = (0..3000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let (scene, pose) = scene_of(mesh(positions, triangles));
+    let tracer = Tracer::new(&scene, &pose);
+    assert_eq!(tracer.leaf_orders()[0].len(), 3000);
+    let ray = Ray { origin_world: Vec3::new(3.0, 0.01, 0.01), direction_world: Vec3::X, t_max: f32::INFINITY };
+    assert!(tracer.occluded(&ray));
+}

@@ -1,0 +1,106 @@
+//! Speed figures, printed by `cargo test -p dapple-trace -- --ignored --nocapture timing`.
+
+use std::time::Instant;
+
+use dapple_scene::glam::Vec3;
+
+use super::{Tracer, count_blocked, offset_origin};
+use crate::sampling::{fixed_pattern, hash, orthonormal_basis};
+use crate::test_support::{Random, cube, joined, scene_of, sphere};
+use dapple_scene::{Mesh, Pose, Scene};
+
+fn moved(mut mesh: Mesh, scale: Vec3, by: Vec3) -> Mesh {
+    for p in &mut mesh.positions {
+        *p = *p * scale + by;
+    }
+    mesh
+}
+
+/// 30 × 12 × 20 m: walls, two storeys of columns with round capitals, rails of small balls. About 200k triangles.
+fn atrium() -> (Scene, Pose) {
+    let mut parts = vec![
+        moved(cube(), Vec3::new(30.0, 0.2, 20.0), Vec3::new(-15.0, -0.2, -10.0)),
+        moved(cube(), Vec3::new(30.0, 12.0, 0.2), Vec3::new(-15.0, 0.0, -10.2)),
+        moved(cube(), Vec3::new(30.0, 12.0, 0.2), Vec3::new(-15.0, 0.0, 10.0)),
+        moved(cube(), Vec3::new(0.2, 12.0, 20.0), Vec3::new(-15.2, 0.0, -10.0)),
+        moved(cube(), Vec3::new(0.2, 12.0, 20.0), Vec3::new(15.0, 0.0, -10.0)),
+    ];
+    for floor in 0..2 {
+        let y = floor as f32 * 6.0;
+        for side in [-1.0, 1.0] {
+            for i in 0..14 {
+                let at = Vec3::new(-13.0 + 2.0 * i as f32, y + 2.5, side * 6.0);
+                parts.push(moved(sphere(Vec3::ZERO, 1.0, 16, 24), Vec3::new(0.35, 2.5, 0.35), at));
+                parts.push(sphere(at + Vec3::Y * 2.4, 0.6, 16, 32));
+                parts.push(moved(cube(), Vec3::new(0.9, 0.3, 0.9), at - Vec3::new(0.45, 2.5, 0.45)));
+            }
+            for i in 0..280 {
+                let at = Vec3::new(-14.0 + 0.1 * i as f32, y + 5.6, side * 5.5);
+                parts.push(sphere(at, 0.06, 8, 9));
+            }
+        }
+    }
+    scene_of(joined(parts))
+}
+
+#[test]
+#[ignore = "timing, run by hand"]
+fn timing_short_rays() {
+    let (scene, pose) = atrium();
+    let mesh = &scene.meshes[0];
+    let start = Instant::now();
+    let tracer = Tracer::new(&scene, &pose);
+    println!("{} triangles, built in {:.0} ms", mesh.triangles.len(), start.elapsed().as_secs_f64() * 1e3);
+
+    // Points spread over the surface by area, neighbours in space next to each other.
+    let mut random = Random(0);
+    let area = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+        f64::from((b - a).cross(c - a).length())
+    };
+    let sums: Vec<f64> = mesh.triangles.iter().scan(0.0, |s, t| { *s += area(t); Some(*s) }).collect();
+    let total = sums.last().copied().unwrap_or(0.0);
+    let mut points: Vec<(u64, Vec3, Vec3)> = (0..20_000)
+        .map(|_| {
+            let pick = f64::from(random.next()) * total;
+            let t = mesh.triangles[sums.partition_point(|s| *s < pick).min(mesh.triangles.len() - 1)];
+            let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+            let (mut u, mut v) = (random.next(), random.next());
+            if u + v > 1.0 {
+                (u, v) = (1.0 - u, 1.0 - v);
+            }
+            let p = a + (b - a) * u + (c - a) * v;
+            let cell = ((p + 20.0) / 40.0 * 1024.0).to_array().map(|x| x as u32);
+            let morton = (0..10).fold(0_u64, |m, bit| {
+                let b = |x: u32| u64::from(x >> bit & 1);
+                m | (b(cell[0]) | b(cell[1]) << 1 | b(cell[2]) << 2) << (3 * bit)
+            });
+            (morton, p, (b - a).cross(c - a).normalize())
+        })
+        .collect();
+    points.sort_by_key(|p| p.0);
+
+    for (rays, t_max, step) in
+        [(64, 0.6, 1), (256, 0.6, 4), (64, 9.0, 4), (64, f32::INFINITY, 8), (16, 0.6, 1)]
+    {
+        let mut directions = Vec::new();
+        let (mut traced, mut blocked, mut patterns) = (0_u64, 0_u64, 0.0);
+        let start = Instant::now();
+        for (i, &(_, p, n)) in points.iter().enumerate().step_by(step) {
+            let before = Instant::now();
+            fixed_pattern(rays, hash(1, i as u64, 0), &mut directions);
+            let (t, b) = orthonormal_basis(n);
+            directions.iter_mut().for_each(|d| *d = t * d.x + b * d.y + n * d.z);
+            patterns += before.elapsed().as_secs_f64();
+            blocked += u64::from(count_blocked(&tracer.occlusion(offset_origin(p, n), &directions, t_max)));
+            traced += u64::from(rays);
+        }
+        let seconds = start.elapsed().as_secs_f64() - patterns;
+        println!(
+            "{rays} rays of {t_max} m a point: {:.2} Mrays/s, {:.1} % blocked (patterns: {:.1} M directions/s)",
+            traced as f64 / seconds / 1e6,
+            100.0 * blocked as f64 / traced as f64,
+            traced as f64 / patterns / 1e6
+        );
+    }
+}

@@ -1,0 +1,329 @@
+//! The upper level: instances in the world, and the queries that the rest of the crate asks.
+
+use std::sync::Arc;
+
+use dapple_scene::glam::{Mat3, Vec3};
+use dapple_scene::{Aabb, Pose, PosedInstance, Scene};
+use rayon::prelude::*;
+
+use super::alpha::{AlphaMaterials, MeshAlpha};
+use super::build::build;
+use super::mesh::{MeshBvh, NearFar};
+use super::packet::{PACKET, Packet, reach};
+use super::tree::{Child, Tree, WIDTH};
+use super::triangle::MeshRay;
+use super::{BlockedMask, Hit, MAX_DIRECTIONS, Ray};
+
+/// World boxes grow by this part of the numbers they were computed from: more than the rounding of the transform.
+const BOX_MARGIN: f32 = 1.0 / (1 << 20) as f32;
+
+/// Answers ray queries on a scene in one pose.
+///
+/// Instances that do not cast ([`dapple_scene::Instance::casts`]), and those whose transform cannot be inverted in
+/// `f32` (scale 0), are not hit. Where a material has alpha (`Mask`, or `Blend` with cutoff 0.5), texels below the
+/// cutoff let rays through.
+#[derive(Clone)]
+pub struct Tracer {
+    alpha: AlphaMaterials,
+    mesh_alpha: Vec<Arc<MeshAlpha>>,
+    /// Trees of meshes with rigid instances, parallel to the scene's meshes.
+    rigid: Vec<Option<Arc<MeshBvh>>>,
+    /// Parallel to the scene's instances; `None` for those that cannot be hit.
+    instances: Vec<Option<PlacedBvh>>,
+    /// Over world boxes; `top.order` holds instance indices.
+    top: Tree,
+}
+
+/// A mesh's tree where it stands.
+#[derive(Clone)]
+struct PlacedBvh {
+    bvh: Arc<MeshBvh>,
+    deformed: bool,
+    placement: Placement,
+    bounds_world: Aabb,
+}
+
+/// World to mesh: the difference to the translation is taken first, in the world, so that an instance far from the
+/// origin loses no more digits than its positions already have.
+#[derive(Clone, Copy)]
+struct Placement {
+    mesh_from_world: Mat3,
+    translation_world: Vec3,
+}
+
+impl Placement {
+    fn new(posed: &PosedInstance) -> Option<Placement> {
+        let world_from_mesh = Mat3::from(posed.world_from_mesh.matrix3);
+        let translation_world = Vec3::from(posed.world_from_mesh.translation);
+        if !(world_from_mesh.is_finite() && translation_world.is_finite()) {
+            return None;
+        }
+        let mesh_from_world = inverse(&world_from_mesh)?;
+        Some(Placement { mesh_from_world, translation_world })
+    }
+
+    #[inline]
+    fn position(&self, position_world: Vec3) -> Vec3 {
+        self.mesh_from_world * (position_world - self.translation_world)
+    }
+
+    #[inline]
+    fn direction(&self, direction_world: Vec3) -> Vec3 {
+        self.mesh_from_world * direction_world
+    }
+
+    fn ray(&self, ray: &Ray) -> Option<MeshRay> {
+        MeshRay::new(self.position(ray.origin_world), self.direction(ray.direction_world), ray.t_max)
+    }
+}
+
+/// The inverse, computed in `f64`; `None` if there is none that `f32` can hold.
+fn inverse(m: &Mat3) -> Option<Mat3> {
+    let [x, y, z] = m.to_cols_array_2d().map(|column| column.map(f64::from));
+    let cross = |a: [f64; 3], b: [f64; 3]| {
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    };
+    let rows = [cross(y, z), cross(z, x), cross(x, y)];
+    let determinant = x[0] * rows[0][0] + x[1] * rows[0][1] + x[2] * rows[0][2];
+    let inverse = Mat3::from_cols_array_2d(&rows.map(|row| row.map(|e| (e / determinant) as f32))).transpose();
+    inverse.is_finite().then_some(inverse)
+}
+
+/// Around the transformed boxes of the root's children, clamped to finite numbers. Empty if there is nothing.
+fn bounds_world(bvh: &MeshBvh, posed: &PosedInstance) -> Aabb {
+    let Some(root) = bvh.tree.nodes.first() else { return Aabb::EMPTY };
+    let map = &posed.world_from_mesh;
+    let linear = Mat3::from(map.matrix3);
+    let absolute = Mat3::from_cols(linear.x_axis.abs(), linear.y_axis.abs(), linear.z_axis.abs());
+    let mut bounds = Aabb::EMPTY;
+    for slot in 0..WIDTH {
+        let b = root.child_bounds(slot);
+        if b.is_empty() {
+            continue;
+        }
+        let size = absolute * b.min.abs().max(b.max.abs()) + Vec3::from(map.translation).abs();
+        let b = b.transformed(map);
+        let margin = size * BOX_MARGIN;
+        bounds = bounds.union(Aabb { min: b.min - margin, max: b.max + margin });
+    }
+    if bounds.is_empty() || bounds.min.is_nan() || bounds.max.is_nan() {
+        return Aabb::EMPTY;
+    }
+    let limit = Vec3::splat(f32::MAX);
+    Aabb { min: bounds.min.clamp(-limit, limit), max: bounds.max.clamp(-limit, limit) }
+}
+
+impl Tracer {
+    /// Builds all trees, in parallel in the caller's rayon pool.
+    pub fn new(scene: &Scene, pose: &Pose) -> Tracer {
+        let alpha = AlphaMaterials::new(scene);
+        let mesh_alpha = scene.meshes.iter().map(|m| Arc::new(MeshAlpha::new(scene, m, &alpha))).collect();
+        let mut tracer = Tracer {
+            alpha,
+            mesh_alpha,
+            rigid: vec![None; scene.meshes.len()],
+            instances: vec![None; scene.instances.len()],
+            top: Tree::default(),
+        };
+        tracer.place(scene, pose);
+        tracer
+    }
+
+    /// Follows the scene to another pose. `scene` is the one the tracer was made for.
+    ///
+    /// Rigid instances cost a box each. Deformed ones are refitted, and built anew once the expected cost of a ray
+    /// has grown by half since they were built. Results are the same as those of a new tracer.
+    pub fn update(&mut self, scene: &Scene, pose: &Pose) {
+        if self.rigid.len() != scene.meshes.len() || self.instances.len() != scene.instances.len() {
+            *self = Tracer::new(scene, pose);
+        } else {
+            self.place(scene, pose);
+        }
+    }
+
+    fn place(&mut self, scene: &Scene, pose: &Pose) {
+        let posed_caster = |i: usize| {
+            let instance = &scene.instances[i];
+            let posed = pose.instances.get(i)?;
+            let mesh = scene.meshes.get(instance.mesh as usize)?;
+            (instance.casts && !mesh.triangles.is_empty()).then_some((instance.mesh as usize, mesh, posed))
+        };
+        let mut wanted = vec![false; scene.meshes.len()];
+        for (mesh, _, posed) in (0..scene.instances.len()).filter_map(posed_caster) {
+            wanted[mesh] |= posed.deformed.is_none();
+        }
+        let mesh_alpha = &self.mesh_alpha;
+        self.rigid.par_iter_mut().enumerate().for_each(|(i, bvh)| {
+            if wanted[i] && bvh.is_none() {
+                let mesh = &scene.meshes[i];
+                *bvh = Some(Arc::new(MeshBvh::new(mesh, &mesh.positions, Arc::clone(&mesh_alpha[i]))));
+            }
+        });
+
+        let rigid = &self.rigid;
+        self.instances.par_iter_mut().enumerate().for_each(|(i, placed)| {
+            let before = placed.take();
+            let Some((mesh_index, mesh, posed)) = posed_caster(i) else { return };
+            let bvh = match (&posed.deformed, before) {
+                (None, _) => rigid[mesh_index].clone(),
+                (Some(deformed), Some(PlacedBvh { mut bvh, deformed: true, .. })) => {
+                    Arc::make_mut(&mut bvh).update(mesh, &deformed.positions);
+                    Some(bvh)
+                }
+                (Some(deformed), _) => {
+                    let alpha = Arc::clone(&mesh_alpha[mesh_index]);
+                    Some(Arc::new(MeshBvh::new(mesh, &deformed.positions, alpha)))
+                }
+            };
+            let (Some(bvh), Some(placement)) = (bvh, Placement::new(posed)) else { return };
+            let bounds_world = bounds_world(&bvh, posed);
+            let deformed = posed.deformed.is_some();
+            *placed = Some(PlacedBvh { bvh, deformed, placement, bounds_world });
+        });
+
+        let (indices, boxes): (Vec<u32>, Vec<Aabb>) = (0_u32..)
+            .zip(&self.instances)
+            .filter_map(|(i, placed)| placed.as_ref().map(|p| (i, p.bounds_world)))
+            .filter(|(_, bounds)| !bounds.is_empty())
+            .unzip();
+        self.top = build(&boxes);
+        for index in &mut self.top.order {
+            *index = indices[*index as usize];
+        }
+    }
+
+    /// Which of `directions_world` (unit length, the first [`MAX_DIRECTIONS`]) are blocked within `t_max` metres of
+    /// `origin_world`, as [`Tracer::occluded`] would answer one by one.
+    pub fn occlusion(&self, origin_world: Vec3, directions_world: &[Vec3], t_max: f32) -> BlockedMask {
+        let directions_world = &directions_world[..directions_world.len().min(MAX_DIRECTIONS)];
+        let mut blocked = BlockedMask::default();
+        if !origin_world.is_finite() || !(t_max > 0.0) {
+            return blocked;
+        }
+        let near = self.instances_near(origin_world, directions_world, t_max);
+        if near.is_empty() {
+            return blocked;
+        }
+        let mut packet = Packet::new();
+        let mut directions_mesh = [Vec3::ZERO; PACKET];
+        for (word, directions) in blocked.iter_mut().zip(directions_world.chunks(PACKET)) {
+            let all = u64::MAX >> (PACKET - directions.len());
+            for &(_, placed) in &near {
+                let open = all & !*word;
+                if open == 0 {
+                    break;
+                }
+                let placement = &placed.placement;
+                for (mesh, world) in directions_mesh.iter_mut().zip(directions) {
+                    *mesh = placement.direction(*world);
+                }
+                let origin = placement.position(origin_world);
+                packet.fill(origin, &directions_mesh[..directions.len()], open, t_max);
+                *word |= packet.trace(&placed.bvh, &self.alpha);
+            }
+        }
+        blocked
+    }
+
+    /// Instances whose box the rays may touch, nearest first.
+    fn instances_near(&self, origin: Vec3, directions: &[Vec3], t_max: f32) -> Vec<(f32, &PlacedBvh)> {
+        let (lo, hi) = reach(directions.iter().copied(), t_max);
+        let (min, max) = (origin + lo, origin + hi);
+        let mut near = Vec::new();
+        let mut stack = Vec::with_capacity(16);
+        if !self.top.nodes.is_empty() {
+            stack.push(0);
+        }
+        while let Some(index) = stack.pop() {
+            let node = &self.top.nodes[index as usize];
+            let mut slots = node.touching(min, max);
+            while slots != 0 {
+                let slot = slots.trailing_zeros() as usize;
+                slots &= slots - 1;
+                match node.child(slot) {
+                    Child::Inner(child) => stack.push(child),
+                    Child::Leaf(range) => {
+                        let indices = self.top.order[range].iter();
+                        for placed in indices.filter_map(|&i| self.instances[i as usize].as_ref()) {
+                            near.push((placed.bounds_world.distance_squared(origin), placed));
+                        }
+                    }
+                    Child::Empty => {}
+                }
+            }
+        }
+        let reach_squared = t_max * t_max * 1.000_01;
+        near.retain(|(distance_squared, _)| *distance_squared <= reach_squared);
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        near
+    }
+
+    /// Whether anything blocks the ray.
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        let mut blocked = false;
+        self.visit_instances(ray, |placed, _| {
+            blocked = placed.placement.ray(ray).is_some_and(|r| placed.bvh.any_hit(0, &r, &self.alpha));
+            if blocked { None } else { Some(ray.t_max) }
+        });
+        blocked
+    }
+
+    /// The nearest thing that the ray meets; of equally near ones that of the lowest instance, then triangle.
+    pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        let mut best: Option<Hit> = None;
+        self.visit_instances(ray, |placed, instance| {
+            let t_best = best.map_or(ray.t_max, |b| b.t);
+            let found = placed.placement.ray(ray).and_then(|r| placed.bvh.closest_hit(&r, t_best, &self.alpha));
+            if let Some((triangle, hit)) = found
+                && best.is_none_or(|b| hit.t < b.t || instance < b.instance)
+            {
+                let barycentrics = Vec3::from_array(hit.weights);
+                best = Some(Hit { t: hit.t, instance, triangle, barycentrics, back_face: hit.back_face });
+            }
+            Some(best.map_or(ray.t_max, |b| b.t))
+        });
+        best
+    }
+
+    /// Calls `visit` for instances whose box the ray may touch; it returns how far the ray still goes, or `None` to
+    /// end.
+    fn visit_instances<'a>(&'a self, ray: &Ray, mut visit: impl FnMut(&'a PlacedBvh, u32) -> Option<f32>) {
+        let Some(world) = MeshRay::new(ray.origin_world, ray.direction_world, ray.t_max) else { return };
+        if self.top.nodes.is_empty() {
+            return;
+        }
+        let planes = NearFar::new(&world);
+        let mut t_max = ray.t_max;
+        let mut stack = vec![0];
+        while let Some(index) = stack.pop() {
+            let node = &self.top.nodes[index as usize];
+            let mut slots = planes.hits(node, &world, t_max);
+            while slots != 0 {
+                let slot = slots.trailing_zeros() as usize;
+                slots &= slots - 1;
+                match node.child(slot) {
+                    Child::Inner(child) => stack.push(child),
+                    Child::Leaf(range) => {
+                        for &instance in &self.top.order[range] {
+                            let Some(placed) = &self.instances[instance as usize] else { continue };
+                            match visit(placed, instance) {
+                                Some(t) => t_max = t,
+                                None => return,
+                            }
+                        }
+                    }
+                    Child::Empty => {}
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+impl Tracer {
+    /// The triangles of each instance in leaf order.
+    pub(super) fn leaf_orders(&self) -> Vec<Vec<u32>> {
+        let placed = self.instances.iter().flatten();
+        placed.map(|p| p.bvh.triangles.iter().map(|t| t.id).collect()).collect()
+    }
+}

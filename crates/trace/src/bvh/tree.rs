@@ -1,0 +1,163 @@
+//! The 8-wide box tree that both levels of the tracer share: its layout, refit and cost.
+
+use dapple_scene::Aabb;
+use dapple_scene::glam::Vec3;
+
+/// Children of a node.
+pub(crate) const WIDTH: usize = 8;
+/// Most primitives in a leaf.
+pub(crate) const MAX_LEAF: usize = 4;
+
+/// Boxes grow by this factor of the distance along the ray, which covers the rounding of the box test and of the
+/// triangle test ([Ize2013] derives 1 + 2 gamma(3) for the former).
+pub(crate) const CONSERVATIVE: f32 = 1.0 + 1.0 / (1 << 20) as f32;
+
+const INNER: u8 = 0;
+const EMPTY: u8 = 0xff;
+
+/// Eight children side by side, so that one box test covers them all.
+#[derive(Clone)]
+#[repr(C, align(64))]
+pub(crate) struct Node {
+    /// Smallest x, y, z, then largest x, y, z of each child; inverted infinities for children that hold nothing.
+    pub(crate) bounds: [[f32; WIDTH]; 6],
+    /// Index of the child node, or of the leaf's first primitive.
+    child: [u32; WIDTH],
+    /// Primitives in the leaf, or [`INNER`], or [`EMPTY`].
+    count: [u8; WIDTH],
+}
+
+/// What a slot of a node holds.
+pub(crate) enum Child {
+    /// Nothing.
+    Empty,
+    /// The node of that index.
+    Inner(u32),
+    /// Primitives in leaf order.
+    Leaf(std::ops::Range<usize>),
+}
+
+impl Node {
+    pub(crate) fn empty() -> Node {
+        let (lo, hi) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
+        Node { bounds: [lo, lo, lo, hi, hi, hi], child: [0; WIDTH], count: [EMPTY; WIDTH] }
+    }
+
+    #[inline(always)]
+    pub(crate) fn child(&self, slot: usize) -> Child {
+        match self.count[slot] {
+            EMPTY => Child::Empty,
+            INNER => Child::Inner(self.child[slot]),
+            n => {
+                let first = self.child[slot] as usize;
+                Child::Leaf(first..first + usize::from(n))
+            }
+        }
+    }
+
+    pub(crate) fn set_inner(&mut self, slot: usize, node: u32) {
+        (self.child[slot], self.count[slot]) = (node, INNER);
+    }
+
+    pub(crate) fn set_leaf(&mut self, slot: usize, first: u32, count: usize) {
+        debug_assert!((1..=MAX_LEAF).contains(&count));
+        (self.child[slot], self.count[slot]) = (first, count as u8);
+    }
+
+    pub(crate) fn set_bounds(&mut self, slot: usize, b: &Aabb) {
+        for axis in 0..3 {
+            self.bounds[axis][slot] = b.min[axis];
+            self.bounds[axis + 3][slot] = b.max[axis];
+        }
+    }
+
+    pub(crate) fn child_bounds(&self, slot: usize) -> Aabb {
+        let b = &self.bounds;
+        Aabb {
+            min: Vec3::new(b[0][slot], b[1][slot], b[2][slot]),
+            max: Vec3::new(b[3][slot], b[4][slot], b[5][slot]),
+        }
+    }
+
+    /// Around all children.
+    pub(crate) fn union(&self) -> Aabb {
+        (0..WIDTH).fold(Aabb::EMPTY, |b, slot| b.union(self.child_bounds(slot)))
+    }
+
+    /// The children (bit i for slot i) that share a point with the box `min` … `max`.
+    #[inline(always)]
+    pub(crate) fn touching(&self, min: Vec3, max: Vec3) -> u32 {
+        let b = &self.bounds;
+        let mut mask = 0;
+        for i in 0..WIDTH {
+            let apart = (b[0][i] > max.x)
+                | (b[1][i] > max.y)
+                | (b[2][i] > max.z)
+                | (b[3][i] < min.x)
+                | (b[4][i] < min.y)
+                | (b[5][i] < min.z);
+            mask |= u32::from(!apart) << i;
+        }
+        mask
+    }
+}
+
+/// A tree over boxes. Nodes lie parents first; leaves name ranges of `order`.
+#[derive(Clone, Default)]
+pub(crate) struct Tree {
+    /// Root first; empty without primitives.
+    pub(crate) nodes: Vec<Node>,
+    /// Primitive indices in leaf order.
+    pub(crate) order: Vec<u32>,
+}
+
+impl Tree {
+    /// Around everything.
+    pub(crate) fn bounds(&self) -> Aabb {
+        self.nodes.first().map_or(Aabb::EMPTY, Node::union)
+    }
+
+    /// Computes all boxes again from the boxes of leaf ranges, without changing who is whose child.
+    pub(crate) fn refit(&mut self, leaf_bounds: impl Fn(std::ops::Range<usize>) -> Aabb) {
+        for index in (0..self.nodes.len()).rev() {
+            for slot in 0..WIDTH {
+                let b = match self.nodes[index].child(slot) {
+                    Child::Empty => continue,
+                    Child::Inner(node) => self.nodes[node as usize].union(),
+                    Child::Leaf(range) => leaf_bounds(range),
+                };
+                self.nodes[index].set_bounds(slot, &b);
+            }
+        }
+    }
+
+    /// Expected cost of a long random ray, in box and triangle tests (surface area heuristic). Finite, ≥ 0.
+    pub(crate) fn cost(&self) -> f64 {
+        let root = half_area(&self.bounds());
+        if !(root > 0.0) {
+            return 0.0;
+        }
+        let mut sum = 0.0;
+        for node in &self.nodes {
+            for slot in 0..WIDTH {
+                let weight = match node.child(slot) {
+                    Child::Empty => continue,
+                    Child::Inner(_) => 1.0,
+                    Child::Leaf(range) => range.len() as f64,
+                };
+                sum += weight * half_area(&node.child_bounds(slot));
+            }
+        }
+        sum / root
+    }
+}
+
+/// Half the surface area of a box in `f64`, which no finite box overflows; 0 if empty.
+pub(crate) fn half_area(b: &Aabb) -> f64 {
+    if b.is_empty() {
+        return 0.0;
+    }
+    let side = |axis: usize| f64::from(b.max[axis]) - f64::from(b.min[axis]);
+    let (x, y, z) = (side(0), side(1), side(2));
+    x * y + y * z + z * x
+}

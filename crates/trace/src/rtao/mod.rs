@@ -1,0 +1,107 @@
+//! Ray-traced ambient occlusion: the visibility of sites, from many rays each. The truth for all other methods.
+//!
+//! - takes: a [`Tracer`], sites (position, normal, key), [`RtaoParams`]
+//! - returns: for each site the part of its cosine-weighted hemisphere that is open within the radius, 0 … 1
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use dapple_scene::glam::Vec3;
+use rayon::prelude::*;
+
+use crate::bvh::{MAX_DIRECTIONS, Tracer, count_blocked, offset_origin};
+use crate::sampling::{extend_pattern, hash, orthonormal_basis};
+
+#[cfg(test)]
+mod tests;
+
+/// Most rays a site.
+pub const MAX_RAYS: u32 = 65_536;
+
+/// Sites traced by one task, and the steps of progress.
+const CHUNK: usize = 256;
+
+/// What to trace at each site.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RtaoParams {
+    /// Rays a site, 1 … [`MAX_RAYS`] (brought into that range), default 512. Powers of two are spread best.
+    pub rays: u32,
+    /// Length of the rays in metres, > 0, default 0.6; infinity is allowed. At 0 or below (or NaN) all is open.
+    pub radius_m: f32,
+    /// Seed of the directions, default 0.
+    pub seed: u64,
+}
+
+impl Default for RtaoParams {
+    fn default() -> Self {
+        RtaoParams { rays: 512, radius_m: 0.6, seed: 0 }
+    }
+}
+
+/// A place on a surface, seen from one side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Site {
+    /// On the surface; rays start a little above it ([`offset_origin`]).
+    pub position_world: Vec3,
+    /// Geometric unit normal, towards the side that is seen. Sites whose normal is not finite or zero are open.
+    pub normal_world: Vec3,
+    /// Chooses the site's directions, with the seed. The same site should keep its key, different ones differ.
+    pub key: u64,
+}
+
+/// Writes the visibility of each site (1 open, 0 blocked), in parallel in the caller's rayon pool.
+///
+/// Each value depends on the scene, its site, and `params` alone: not on the other sites nor the number of threads.
+///
+/// # Panics
+///
+/// If `sites` and `visibility` differ in length.
+pub fn trace_visibility(tracer: &Tracer, sites: &[Site], params: &RtaoParams, visibility: &mut [f32]) {
+    trace_visibility_with_progress(tracer, sites, params, visibility, &|_| {});
+}
+
+/// [`trace_visibility`] that calls `progress` with the number of sites done so far, every few hundred sites.
+///
+/// Calls come from the pool's threads, and may arrive out of order; the largest number is the latest.
+///
+/// # Panics
+///
+/// If `sites` and `visibility` differ in length.
+pub fn trace_visibility_with_progress(
+    tracer: &Tracer,
+    sites: &[Site],
+    params: &RtaoParams,
+    visibility: &mut [f32],
+    progress: &(dyn Fn(u64) + Sync),
+) {
+    assert_eq!(sites.len(), visibility.len(), "one visibility for each site");
+    let done = AtomicU64::new(0);
+    sites.par_chunks(CHUNK).zip(visibility.par_chunks_mut(CHUNK)).for_each(|(sites, visibility)| {
+        let mut directions = Vec::with_capacity(MAX_DIRECTIONS);
+        for (site, visibility) in sites.iter().zip(visibility) {
+            *visibility = trace_site(tracer, site, params, &mut directions);
+        }
+        let before = done.fetch_add(sites.len() as u64, Ordering::Relaxed);
+        progress(before + sites.len() as u64);
+    });
+}
+
+fn trace_site(tracer: &Tracer, site: &Site, params: &RtaoParams, directions: &mut Vec<Vec3>) -> f32 {
+    let normal = site.normal_world;
+    if !normal.is_finite() || normal == Vec3::ZERO {
+        return 1.0;
+    }
+    let rays = params.rays.clamp(1, MAX_RAYS);
+    let origin = offset_origin(site.position_world, normal);
+    let (tangent, bitangent) = orthonormal_basis(normal);
+    let site_hash = hash(params.seed, site.key, 0);
+    let mut blocked = 0;
+    for first in (0..rays).step_by(MAX_DIRECTIONS) {
+        directions.clear();
+        extend_pattern(first..rays.min(first + MAX_DIRECTIONS as u32), site_hash, directions);
+        for d in directions.iter_mut() {
+            *d = tangent * d.x + bitangent * d.y + normal * d.z;
+        }
+        blocked += count_blocked(&tracer.occlusion(origin, directions, params.radius_m));
+    }
+    (rays - blocked) as f32 / rays as f32
+}
