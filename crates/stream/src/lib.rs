@@ -1,1 +1,13 @@
-//! dapple-stream
+//! Changes of a store ⇄ frames of bytes, blind to transport: no sockets, clock or threads in here.
+//!
+//! A [`Publisher`] (feature `zstd`) turns the states of a [`PointStore`](dapple_store::points::PointStore) into
+//! [`Frame`]s; a [`Subscriber`] turns any bytes back into the same store, bit for bit, or names what is wrong
+//! with them. The frames are specified in `docs/wire.md`; [`codec`] is the bits, [`session`] the order.
+
+pub mod codec;
+pub mod session;
+
+pub use codec::{DecodeError, FrameHeader, FrameKind, Limits};
+#[cfg(feature = "zstd")]
+pub use session::{Frame, PublishError, Publisher, PublisherConfig};
+pub use session::{Applied, IgnoreReason, ReceiveError, Subscriber, ValueChange};

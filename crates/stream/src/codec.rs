@@ -1,0 +1,122 @@
+//! The bits of frames: what `docs/wire.md` specifies, as pure functions.
+//!
+//! A snapshot is a layout and one value a point. Points are in Morton order, so a position is the distance of
+//! its cell from the previous point's cell and the place within the cell; of that place one coordinate follows
+//! nearly from the other two, because points lie on surfaces whose normals are known ([`plane`]). A delta is
+//! gaps between changed points and the differences from the values the receiver holds.
+
+mod decode;
+#[cfg(feature = "zstd")]
+mod encode;
+mod frame;
+mod plane;
+mod section;
+mod varint;
+
+pub(crate) use decode::{decode_layout, decode_steps, decode_values, parse_delta, parse_snapshot};
+#[cfg(feature = "zstd")]
+pub(crate) use encode::{delta_payload, encode_layout, snapshot_payload};
+pub use frame::{FrameHeader, FrameKind, MAGIC, VERSION, seal};
+pub(crate) use frame::open;
+
+use dapple_store::points::LayoutError;
+
+/// What a receiver is willing to take. Every allocation of a decoder is bounded by these, whatever the bytes say:
+/// at most 64 bytes for each of `max_points`, 64 for each of `max_sets`, and 8 MiB.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Longest frame, bytes. Default 64 MiB.
+    pub max_frame_bytes: usize,
+    /// Most points of a layout. Default 2²² (4 million, some 16,000 m² at 6.7 cm); at most
+    /// [`MAX_POINTS`](dapple_store::points::MAX_POINTS) has an effect.
+    pub max_points: u32,
+    /// Most sets (instances with points) of a layout. Default 65,536.
+    pub max_sets: u32,
+}
+
+impl Default for Limits {
+    fn default() -> Limits {
+        Limits { max_frame_bytes: 64 << 20, max_points: 1 << 22, max_sets: 1 << 16 }
+    }
+}
+
+/// Why bytes are not a frame.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DecodeError {
+    /// The bytes end before the frame does.
+    #[error("frame: {have} bytes, at least {need} needed; the frame was cut")]
+    Truncated {
+        /// Bytes given.
+        have: usize,
+        /// Bytes that a complete frame would have at the least.
+        need: usize,
+    },
+    /// There are more bytes than the frame has.
+    #[error("frame: {extra} bytes after its end; hand over one frame at a time")]
+    TrailingBytes {
+        /// How many.
+        extra: usize,
+    },
+    /// Not a frame of this protocol.
+    #[error("frame: begins with {found:02x?}, not with {MAGIC:02x?}; this is no Dapple stream")]
+    BadMagic {
+        /// First two bytes.
+        found: [u8; 2],
+    },
+    /// A version this code does not speak.
+    #[error("frame: version {found}, this end speaks {VERSION}; update the older end")]
+    UnsupportedVersion {
+        /// Version of the frame.
+        found: u8,
+    },
+    /// A bit was changed on the way.
+    #[error("frame: checksum {computed:08x}, it says {stored:08x}; the frame was damaged on its way")]
+    Corrupt {
+        /// Checksum in the frame.
+        stored: u32,
+        /// Checksum of the bytes that came.
+        computed: u32,
+    },
+    /// A kind of frame that this version does not have.
+    #[error("frame: unknown kind {found}")]
+    UnknownKind {
+        /// The byte.
+        found: u8,
+    },
+    /// A number exceeds the receiver's [`Limits`].
+    #[error("frame: {what} {value}, this end takes at most {limit}; raise its limits if that is meant")]
+    TooLarge {
+        /// Of what there is too much.
+        what: &'static str,
+        /// How much.
+        value: u64,
+        /// How much is allowed.
+        limit: u64,
+    },
+    /// The frame is whole, but breaks a rule of the format: the sender is at fault.
+    #[error("frame: {part}: {reason}; the sender does not follow the wire format")]
+    Malformed {
+        /// Which part.
+        part: &'static str,
+        /// What is wrong.
+        reason: &'static str,
+    },
+    /// The layout breaks a rule of the store.
+    #[error("frame: {0}")]
+    Layout(#[from] LayoutError),
+}
+
+/// The start of every Zstandard frame, which sections leave out.
+const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
+
+/// Maps small differences of either sign, modulo 256, to small bytes.
+#[cfg(feature = "zstd")]
+fn zigzag(difference: u8) -> u8 {
+    let d = difference as i8;
+    ((d << 1) ^ (d >> 7)) as u8
+}
+
+/// The inverse of [`zigzag`].
+fn unzigzag(code: u8) -> u8 {
+    (code >> 1) ^ (code & 1).wrapping_neg()
+}

@@ -1,0 +1,197 @@
+//! Payloads → layouts, values and changes. Total: any bytes give a value or an error, within [`Limits`].
+
+use dapple_store::points::{MAX_POINTS, PackedNormal, PointLayout, PointSet, morton_decode};
+use glam::Vec3;
+
+use super::plane::{Plane, reference};
+use super::section::unpack;
+use super::varint::Reader;
+use super::{DecodeError, Limits, unzigzag};
+
+/// Most bytes of a varint below 2⁶³.
+const MAX_GAP_BYTES: usize = 9;
+
+/// Most bytes of a varint below 2²⁴.
+const MAX_POINT_GAP_BYTES: usize = 4;
+
+/// The parts of a snapshot, the large ones still encoded.
+pub(crate) struct SnapshotParts<'a> {
+    pub(crate) scene_hash: [u8; 32],
+    pub(crate) layout: &'a [u8],
+    pub(crate) values: &'a [u8],
+}
+
+/// The parts of a delta, its changes still encoded.
+pub(crate) struct DeltaParts<'a> {
+    pub(crate) base_epoch: u64,
+    changes: Reader<'a>,
+}
+
+pub(crate) fn parse_snapshot(payload: &[u8]) -> Result<SnapshotParts<'_>, DecodeError> {
+    let mut reader = Reader::new(payload);
+    let scene_hash = reader.array("scene hash")?;
+    let layout_bytes = usize::try_from(reader.varint("layout")?).unwrap_or(usize::MAX);
+    let layout = reader.take(layout_bytes, "layout")?;
+    let values = reader.take(reader.len(), "values")?;
+    Ok(SnapshotParts { scene_hash, layout, values })
+}
+
+pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<PointLayout, DecodeError> {
+    let bad = |part, reason| DecodeError::Malformed { part, reason };
+    let mut reader = Reader::new(bytes);
+    let quantum_m = reader.f32("layout lengths")?;
+    let spacing_m = reader.f32("layout lengths")?;
+    let local_bits = u32::from(reader.byte("layout local bits")?);
+    if local_bits > 8 {
+        return Err(bad("layout local bits", "exceed 8"));
+    }
+    let (mut sets, counts) = decode_sets(&mut reader, limits)?;
+    let total: usize = counts.iter().sum();
+
+    let normals_x = unpack(&mut reader, "normals", total, total)?;
+    let normals_y = unpack(&mut reader, "normals", total, total)?;
+    let cell_gaps = unpack(&mut reader, "cell gaps", total, MAX_GAP_BYTES * total)?;
+    let along_0 = unpack(&mut reader, "coordinates", total, total)?;
+    let along_1 = unpack(&mut reader, "coordinates", total, total)?;
+    let across = unpack(&mut reader, "coordinates", total, total)?;
+    if !reader.is_empty() {
+        return Err(bad("layout", "has bytes after its last section"));
+    }
+    let local_mask = (1u32 << local_bits) - 1;
+    if [&along_0, &along_1, &across].into_iter().flatten().any(|&c| u32::from(c) > local_mask) {
+        return Err(bad("coordinates", "exceed the cell"));
+    }
+
+    let mut gaps = Reader::new(&cell_gaps);
+    let mut first = 0;
+    for (set, count) in sets.iter_mut().zip(counts) {
+        set.normals = Vec::with_capacity(count);
+        set.positions = Vec::with_capacity(count);
+        let mut normal = [0u8; 2];
+        for i in first..first + count {
+            normal[0] = normal[0].wrapping_add(unzigzag(normals_x[i]));
+            normal[1] = normal[1].wrapping_add(unzigzag(normals_y[i]));
+            set.normals.push(PackedNormal(normal));
+        }
+        let mut cell = 0u64;
+        for i in 0..count {
+            cell = gaps
+                .varint("cell gaps")?
+                .checked_add(cell)
+                .filter(|&cell| cell < 1 << (63 - 3 * local_bits))
+                .ok_or(bad("cell gaps", "leave the 21-bit grid"))?;
+            let corner = morton_decode(cell << (3 * local_bits));
+            let plane = Plane::new(set.normals[i]);
+            let at = first + i;
+            let mut position = corner;
+            position[plane.along[0]] |= u32::from(along_0[at]);
+            position[plane.along[1]] |= u32::from(along_1[at]);
+            let along = plane.along.map(|axis| position[axis]);
+            let predicted = plane.predict(reference(&set.positions, &set.normals, i), along);
+            position[plane.across] |= predicted.wrapping_add(u32::from(across[at])) & local_mask;
+            set.positions.push(position);
+        }
+        first += count;
+    }
+    if !gaps.is_empty() {
+        return Err(bad("cell gaps", "are more than there are points"));
+    }
+    Ok(PointLayout::new(quantum_m, spacing_m, sets)?)
+}
+
+/// The table of sets, still without points, and how many points each has: together within the limits.
+fn decode_sets(
+    reader: &mut Reader<'_>,
+    limits: &Limits,
+) -> Result<(Vec<PointSet>, Vec<usize>), DecodeError> {
+    let part = "sets";
+    let count = reader.varint(part)?;
+    if count > u64::from(limits.max_sets) {
+        return Err(DecodeError::TooLarge { what: part, value: count, limit: limits.max_sets.into() });
+    }
+    let max_points = u64::from(limits.max_points.min(MAX_POINTS));
+    let mut sets = Vec::new();
+    let mut counts = Vec::new();
+    let mut next_instance = 0u64;
+    let mut total = 0u64;
+    for _ in 0..count {
+        let instance = reader.varint(part)?.saturating_add(next_instance);
+        next_instance = instance.saturating_add(1);
+        let instance = u32::try_from(instance)
+            .map_err(|_| DecodeError::Malformed { part, reason: "an instance exceeds 32 bits" })?;
+        let origin_rest = Vec3::new(reader.f32(part)?, reader.f32(part)?, reader.f32(part)?);
+        let points = reader.varint(part)?;
+        total = total.saturating_add(points);
+        if total > max_points {
+            return Err(DecodeError::TooLarge { what: "points", value: total, limit: max_points });
+        }
+        counts.push(points as usize);
+        sets.push(PointSet { instance, origin_rest, ..PointSet::default() });
+    }
+    Ok((sets, counts))
+}
+
+/// The values of `points` points.
+pub(crate) fn decode_values(bytes: &[u8], points: usize) -> Result<Vec<u8>, DecodeError> {
+    let mut reader = Reader::new(bytes);
+    let mut values = unpack(&mut reader, "values", points, points)?;
+    if !reader.is_empty() {
+        return Err(DecodeError::Malformed { part: "values", reason: "have bytes after their section" });
+    }
+    let mut last = u8::MAX;
+    for value in &mut values {
+        last = last.wrapping_add(unzigzag(*value));
+        *value = last;
+    }
+    Ok(values)
+}
+
+/// Splits the payload of a delta whose frame carries `epoch`.
+pub(crate) fn parse_delta(epoch: u64, payload: &[u8]) -> Result<DeltaParts<'_>, DecodeError> {
+    let part = "base epoch";
+    let mut changes = Reader::new(payload);
+    let back = changes.varint(part)?;
+    if back == 0 {
+        return Err(DecodeError::Malformed { part, reason: "is the frame's own" });
+    }
+    let base_epoch = epoch.checked_sub(back).ok_or(DecodeError::Malformed { part, reason: "is negative" })?;
+    Ok(DeltaParts { base_epoch, changes })
+}
+
+/// The changes of a delta for a store of `points` points: what to add, modulo 256, to which points. Indices
+/// strictly increase.
+pub(crate) fn decode_steps(parts: &DeltaParts<'_>, points: usize) -> Result<Vec<(u32, u8)>, DecodeError> {
+    let bad = |part, reason| DecodeError::Malformed { part, reason };
+    let mut reader = parts.changes;
+    let count = reader.varint("changes")?;
+    if count == 0 {
+        return Err(bad("changes", "are none"));
+    }
+    if count > points as u64 {
+        return Err(bad("changes", "are more than there are points"));
+    }
+    let count = count as usize;
+    let gaps = unpack(&mut reader, "change gaps", count, MAX_POINT_GAP_BYTES * count)?;
+    let residuals = unpack(&mut reader, "change values", count, count)?;
+    if !reader.is_empty() {
+        return Err(bad("changes", "have bytes after their last section"));
+    }
+    let mut gaps = Reader::new(&gaps);
+    let mut next = 0u64;
+    let mut steps = Vec::with_capacity(count);
+    for residual in residuals {
+        let point = next.saturating_add(gaps.varint("change gaps")?);
+        if point >= points as u64 {
+            return Err(bad("change gaps", "name a point that does not exist"));
+        }
+        if residual == 0 {
+            return Err(bad("change values", "leave a value as it was"));
+        }
+        next = point + 1;
+        steps.push((point as u32, unzigzag(residual)));
+    }
+    if !gaps.is_empty() {
+        return Err(bad("change gaps", "are more than there are changes"));
+    }
+    Ok(steps)
+}

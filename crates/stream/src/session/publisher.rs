@@ -1,0 +1,205 @@
+//! States of a store → frames.
+
+use std::sync::Arc;
+
+use dapple_store::points::{PointLayout, PointStore};
+
+use crate::codec::{FrameKind, delta_payload, encode_layout, seal, snapshot_payload};
+
+/// How a [`Publisher`] numbers and cuts its groups.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PublisherConfig {
+    /// Number of the first group. Must exceed every group number that subscribers of this stream can have seen,
+    /// also from an earlier process: milliseconds since 1970 at start will do. Default 0.
+    pub first_group: u64,
+    /// Deltas after which the next change starts a new group, whose snapshot then goes to everyone. Default 0:
+    /// only a new layout or [`Publisher::start_group`] does. Relays that keep whole groups for late joiners need
+    /// it; who asks [`Publisher::join`] for each joiner does not.
+    pub deltas_per_group: u32,
+}
+
+/// One frame, ready for any transport.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// Snapshot or delta.
+    pub kind: FrameKind,
+    /// Its group.
+    pub group: u64,
+    /// Epoch of the store once it is applied.
+    pub epoch: u64,
+    /// The complete bytes on the wire.
+    pub bytes: Arc<[u8]>,
+}
+
+/// Why a state could not be published.
+#[derive(Debug, thiserror::Error)]
+pub enum PublishError {
+    /// Epochs must increase from call to call.
+    #[error("publish: epoch {epoch} after epoch {last}; epochs must increase")]
+    EpochNotIncreasing {
+        /// The one given.
+        epoch: u64,
+        /// The one before.
+        last: u64,
+    },
+    /// The compressor failed, which means that memory ran out.
+    #[error("publish: compression failed: {0}")]
+    Compress(#[from] std::io::Error),
+}
+
+/// The sending end: takes the state of each epoch, gives the frame that carries subscribers there.
+///
+/// It keeps one byte a point (what subscribers hold) and the encoded layout, and never an older state: a
+/// subscriber that fell behind or joins takes a snapshot of the present one, made at most once an epoch.
+#[derive(Debug)]
+pub struct Publisher {
+    scene_hash: [u8; 32],
+    config: PublisherConfig,
+    last_epoch: Option<u64>,
+    state: Option<State>,
+}
+
+/// What subscribers that are up to date hold.
+#[derive(Debug)]
+struct State {
+    layout: Arc<PointLayout>,
+    layout_bytes: Vec<u8>,
+    visibility: Vec<u8>,
+    group: u64,
+    /// Epoch of the last change, not of the last call.
+    epoch: u64,
+    deltas: u32,
+    /// The snapshot of this very state, once someone needed it.
+    snapshot: Option<Frame>,
+}
+
+impl Publisher {
+    /// A publisher of the scene with this hash. Nothing is sent before the first [`Publisher::publish`].
+    pub fn new(scene_hash: [u8; 32], config: PublisherConfig) -> Publisher {
+        Publisher { scene_hash, config, last_epoch: None, state: None }
+    }
+
+    /// Publishes the state `store` at `epoch`, which must exceed the one of the call before. Gives the frame for
+    /// subscribers that are up to date, or `None` where they already hold this state: a still scene sends nothing.
+    ///
+    /// What changed is found here, by comparison with what subscribers hold. The frame is a delta, or a snapshot
+    /// where a group starts: at first, with a new layout, and as [`PublisherConfig::deltas_per_group`] says.
+    /// On an error nothing has happened.
+    pub fn publish(&mut self, epoch: u64, store: &PointStore) -> Result<Option<Frame>, PublishError> {
+        if let Some(last) = self.last_epoch
+            && epoch <= last
+        {
+            return Err(PublishError::EpochNotIncreasing { epoch, last });
+        }
+        let frame = match &mut self.state {
+            Some(state) if same_layout(&state.layout, store.layout()) => {
+                let full = self.config.deltas_per_group;
+                if full > 0 && state.deltas >= full && state.visibility != store.visibility() {
+                    let previous = std::mem::replace(&mut state.visibility, store.visibility().to_vec());
+                    match state.start_group(epoch, &self.scene_hash) {
+                        Ok(frame) => Some(frame),
+                        Err(error) => {
+                            state.visibility = previous;
+                            return Err(error.into());
+                        }
+                    }
+                } else {
+                    state.advance(epoch, store.visibility())?
+                }
+            }
+            old => {
+                let group = old.as_ref().map_or(self.config.first_group, |state| state.group + 1);
+                let mut state = State {
+                    layout: store.layout().clone(),
+                    layout_bytes: encode_layout(store.layout())?,
+                    visibility: store.visibility().to_vec(),
+                    group,
+                    epoch,
+                    deltas: 0,
+                    snapshot: None,
+                };
+                let frame = state.snapshot(&self.scene_hash)?;
+                *old = Some(state);
+                Some(frame)
+            }
+        };
+        self.last_epoch = Some(epoch);
+        Ok(frame)
+    }
+
+    /// What a subscriber that joins now, or fell behind, needs: one snapshot of the present state, after which
+    /// it is up to date. `None` before the first [`Publisher::publish`].
+    pub fn join(&mut self) -> Result<Option<Frame>, PublishError> {
+        match &mut self.state {
+            Some(state) => Ok(Some(state.snapshot(&self.scene_hash)?)),
+            None => Ok(None),
+        }
+    }
+
+    /// Starts a new group with the present state; its snapshot is for everyone. `None` before the first
+    /// [`Publisher::publish`].
+    pub fn start_group(&mut self) -> Result<Option<Frame>, PublishError> {
+        match &mut self.state {
+            Some(state) => Ok(Some(state.start_group(state.epoch, &self.scene_hash)?)),
+            None => Ok(None),
+        }
+    }
+
+    /// The group that subscribers that are up to date are in.
+    pub fn group(&self) -> Option<u64> {
+        self.state.as_ref().map(|state| state.group)
+    }
+
+    /// Epoch of the last change: the one that subscribers that are up to date hold.
+    pub fn epoch(&self) -> Option<u64> {
+        self.state.as_ref().map(|state| state.epoch)
+    }
+}
+
+impl State {
+    /// The snapshot of the present state. Its layout part is only copied.
+    fn snapshot(&mut self, scene_hash: &[u8; 32]) -> Result<Frame, std::io::Error> {
+        if let Some(frame) = &self.snapshot {
+            return Ok(frame.clone());
+        }
+        let payload = snapshot_payload(scene_hash, &self.layout_bytes, &self.visibility)?;
+        let frame = Frame::new(FrameKind::Snapshot, self.group, self.epoch, &payload);
+        self.snapshot = Some(frame.clone());
+        Ok(frame)
+    }
+
+    /// Puts the present values into a new group at `epoch`; on an error nothing has happened.
+    fn start_group(&mut self, epoch: u64, scene_hash: &[u8; 32]) -> Result<Frame, std::io::Error> {
+        let payload = snapshot_payload(scene_hash, &self.layout_bytes, &self.visibility)?;
+        let frame = Frame::new(FrameKind::Snapshot, self.group + 1, epoch, &payload);
+        (self.group, self.epoch, self.deltas) = (self.group + 1, epoch, 0);
+        self.snapshot = Some(frame.clone());
+        Ok(frame)
+    }
+
+    /// Goes on to the values `visibility` within the group.
+    fn advance(&mut self, epoch: u64, visibility: &[u8]) -> Result<Option<Frame>, std::io::Error> {
+        let Some(payload) = delta_payload(epoch - self.epoch, &self.visibility, visibility)? else {
+            return Ok(None);
+        };
+        self.visibility.copy_from_slice(visibility);
+        self.epoch = epoch;
+        self.deltas = self.deltas.saturating_add(1);
+        self.snapshot = None;
+        Ok(Some(Frame::new(FrameKind::Delta, self.group, epoch, &payload)))
+    }
+}
+
+impl Frame {
+    fn new(kind: FrameKind, group: u64, epoch: u64, payload: &[u8]) -> Frame {
+        Frame { kind, group, epoch, bytes: seal(kind, group, epoch, payload).into() }
+    }
+}
+
+/// Whether the layouts are the same to the bit (`==` holds 0 and -0 to be equal).
+fn same_layout(a: &Arc<PointLayout>, b: &Arc<PointLayout>) -> bool {
+    let origins = |layout: &PointLayout| -> Vec<[u32; 3]> {
+        layout.sets().iter().map(|set| set.origin_rest.to_array().map(f32::to_bits)).collect()
+    };
+    Arc::ptr_eq(a, b) || (a == b && origins(a) == origins(b))
+}

@@ -1,0 +1,231 @@
+//! Frames → the publisher's store.
+
+use std::sync::Arc;
+
+use dapple_store::points::{Change, PointLayout, PointStore, StoreError};
+
+use crate::codec::{
+    DecodeError, FrameHeader, FrameKind, Limits, decode_layout, decode_steps, decode_values, open, parse_delta,
+    parse_snapshot,
+};
+
+/// What a frame did to the store, so that the receiver redoes only that.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Applied {
+    /// A snapshot brought a layout: everything derived from points must be made anew.
+    NewLayout,
+    /// The points are the same; these have new values, in order of index.
+    Changes(Vec<ValueChange>),
+    /// Nothing; the frame was not needed.
+    Ignored(IgnoreReason),
+}
+
+/// A point whose visibility changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ValueChange {
+    /// Index of the point in the store.
+    pub point: u32,
+    /// Visibility before, 255 = open.
+    pub old: u8,
+    /// Visibility now; never the same.
+    pub new: u8,
+}
+
+/// Why a sound frame was not needed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum IgnoreReason {
+    /// Its group was replaced by a newer one.
+    OlderGroup,
+    /// The store is already further in its group.
+    OldEpoch,
+    /// The store is exactly there.
+    Duplicate,
+}
+
+/// Why a frame could not be used. The store is as it was before.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ReceiveError {
+    /// The bytes are not a frame, or exceed the limits.
+    #[error(transparent)]
+    Decode(#[from] DecodeError),
+    /// The frame builds on a state that this end does not hold.
+    #[error(
+        "receive: the delta builds on group {group}, epoch {base_epoch}, but {} is held; ask for a snapshot",
+        held.map_or("nothing".to_owned(), |(group, epoch)| format!("group {group}, epoch {epoch}"))
+    )]
+    NeedSnapshot {
+        /// Group of the delta.
+        group: u64,
+        /// Epoch that it builds on.
+        base_epoch: u64,
+        /// Group and epoch that are held.
+        held: Option<(u64, u64)>,
+    },
+    /// The light belongs to another scene.
+    #[error(
+        "receive: light of scene {}…, this end shows scene {}…; load the same scene on both ends",
+        short(found),
+        short(expected)
+    )]
+    WrongScene {
+        /// Hash of the scene that this end shows.
+        expected: [u8; 32],
+        /// Hash in the snapshot.
+        found: [u8; 32],
+    },
+}
+
+impl ReceiveError {
+    /// Whether a snapshot from the publisher ([`Publisher::join`](crate::Publisher::join)) would help: true for
+    /// gaps and damage, false where the two ends do not fit each other.
+    pub fn snapshot_helps(&self) -> bool {
+        match self {
+            ReceiveError::NeedSnapshot { .. } => true,
+            ReceiveError::WrongScene { .. } => false,
+            ReceiveError::Decode(error) => matches!(
+                error,
+                DecodeError::Truncated { .. } | DecodeError::TrailingBytes { .. } | DecodeError::Corrupt { .. }
+            ),
+        }
+    }
+}
+
+/// The receiving end: takes frames in any order, holds the newest state that they lead to.
+#[derive(Clone, Debug)]
+pub struct Subscriber {
+    expected_scene_hash: Option<[u8; 32]>,
+    limits: Limits,
+    state: Option<State>,
+}
+
+#[derive(Clone, Debug)]
+struct State {
+    group: u64,
+    epoch: u64,
+    scene_hash: [u8; 32],
+    /// The layout as it came, to know it again in the next snapshot without decoding it.
+    layout_bytes: Vec<u8>,
+    store: PointStore,
+}
+
+impl Subscriber {
+    /// A subscriber that holds nothing. Snapshots of another scene than `expected_scene_hash` are refused;
+    /// `None` takes any (default of tools that only look).
+    pub fn new(expected_scene_hash: Option<[u8; 32]>, limits: Limits) -> Subscriber {
+        Subscriber { expected_scene_hash, limits, state: None }
+    }
+
+    /// Takes one complete frame. Any bytes are welcome; on an error the store is as it was.
+    pub fn receive(&mut self, bytes: &[u8]) -> Result<Applied, ReceiveError> {
+        let (header, payload) = open(bytes, &self.limits)?;
+        if let Some(reason) = self.not_needed(&header) {
+            return Ok(Applied::Ignored(reason));
+        }
+        match header.kind {
+            FrameKind::Snapshot => self.receive_snapshot(&header, payload),
+            FrameKind::Delta => self.receive_delta(&header, payload),
+        }
+    }
+
+    /// What is held, if anything yet.
+    pub fn store(&self) -> Option<&PointStore> {
+        self.state.as_ref().map(|state| &state.store)
+    }
+
+    /// Group of the state that is held.
+    pub fn group(&self) -> Option<u64> {
+        self.state.as_ref().map(|state| state.group)
+    }
+
+    /// Epoch of the state that is held: that of its last change.
+    pub fn epoch(&self) -> Option<u64> {
+        self.state.as_ref().map(|state| state.epoch)
+    }
+
+    /// Hash of the scene that the held light belongs to.
+    pub fn scene_hash(&self) -> Option<[u8; 32]> {
+        self.state.as_ref().map(|state| state.scene_hash)
+    }
+
+    fn not_needed(&self, header: &FrameHeader) -> Option<IgnoreReason> {
+        let state = self.state.as_ref()?;
+        if header.group < state.group {
+            Some(IgnoreReason::OlderGroup)
+        } else if header.group > state.group || header.epoch > state.epoch {
+            None
+        } else if header.epoch < state.epoch {
+            Some(IgnoreReason::OldEpoch)
+        } else {
+            Some(IgnoreReason::Duplicate)
+        }
+    }
+
+    fn receive_snapshot(&mut self, header: &FrameHeader, payload: &[u8]) -> Result<Applied, ReceiveError> {
+        let parts = parse_snapshot(payload)?;
+        if let Some(expected) = self.expected_scene_hash
+            && expected != parts.scene_hash
+        {
+            return Err(ReceiveError::WrongScene { expected, found: parts.scene_hash });
+        }
+        if let Some(state) = self.state.as_mut()
+            && state.scene_hash == parts.scene_hash
+            && state.layout_bytes == parts.layout
+        {
+            let values = decode_values(parts.values, state.store.layout().len())?;
+            let changes: Vec<ValueChange> = (0u32..)
+                .zip(state.store.visibility().iter().zip(&values))
+                .filter(|(_, (old, new))| old != new)
+                .map(|(point, (&old, &new))| ValueChange { point, old, new })
+                .collect();
+            state.store = new_store(state.store.layout().clone(), values)?;
+            (state.group, state.epoch) = (header.group, header.epoch);
+            return Ok(Applied::Changes(changes));
+        }
+        let layout = Arc::new(decode_layout(parts.layout, &self.limits)?);
+        let values = decode_values(parts.values, layout.len())?;
+        self.state = Some(State {
+            group: header.group,
+            epoch: header.epoch,
+            scene_hash: parts.scene_hash,
+            layout_bytes: parts.layout.to_vec(),
+            store: new_store(layout, values)?,
+        });
+        Ok(Applied::NewLayout)
+    }
+
+    fn receive_delta(&mut self, header: &FrameHeader, payload: &[u8]) -> Result<Applied, ReceiveError> {
+        let parts = parse_delta(header.epoch, payload)?;
+        let need = |held| ReceiveError::NeedSnapshot { group: header.group, base_epoch: parts.base_epoch, held };
+        let state = self.state.as_mut().ok_or(need(None))?;
+        if (state.group, state.epoch) != (header.group, parts.base_epoch) {
+            return Err(need(Some((state.group, state.epoch))));
+        }
+        let values = state.store.visibility();
+        let changes: Vec<ValueChange> = decode_steps(&parts, values.len())?
+            .into_iter()
+            .map(|(point, step)| {
+                let old = values[point as usize];
+                ValueChange { point, old, new: old.wrapping_add(step) }
+            })
+            .collect();
+        let news: Vec<Change> =
+            changes.iter().map(|c| Change { point: c.point, visibility: c.new }).collect();
+        state.store.apply(&news).map_err(misfit)?;
+        state.epoch = header.epoch;
+        Ok(Applied::Changes(changes))
+    }
+}
+
+fn new_store(layout: Arc<PointLayout>, values: Vec<u8>) -> Result<PointStore, DecodeError> {
+    PointStore::new(layout, values).map_err(misfit)
+}
+
+/// The decoder has checked counts and indices already; should the store see more, the sender is at fault.
+fn misfit(_: StoreError) -> DecodeError {
+    DecodeError::Malformed { part: "values", reason: "do not fit the layout" }
+}
+
+/// First bytes of a hash, as text.
+fn short(hash: &[u8; 32]) -> String {
+    hash[..6].iter().map(|b| format!("{b:02x}")).collect()
+}
