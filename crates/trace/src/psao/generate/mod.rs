@@ -11,13 +11,13 @@ mod tests;
 use std::sync::Arc;
 
 use dapple_scene::{Pose, Scene};
-use dapple_store::points::{LayoutError, MAX_COORDINATE, MAX_POINTS, PackedNormal, PointLayout, PointSet};
 use dapple_store::points::morton_code;
+use dapple_store::points::{LayoutError, MAX_COORDINATE, MAX_POINTS, PackedNormal, PointLayout, PointSet};
 use glam::Vec3;
 use rayon::prelude::*;
 
 pub use anchor::Anchor;
-pub(crate) use anchor::{PosedPoint, pose_anchor};
+pub(crate) use anchor::pose_anchor;
 use eliminate::{Candidate, eliminate, maximum_radius};
 
 use crate::sampling::{fixed_pattern, hash, orthonormal_basis};
@@ -199,10 +199,8 @@ fn lay_instance(
     let mut points = Vec::new();
     if area.total > 0.0 {
         let spawned = spawn(scene, instance, area, density, seed);
-        let candidates: Vec<Candidate> = spawned
-            .iter()
-            .map(|p| Candidate { position: p.position_rest, normal: p.normal_rest })
-            .collect();
+        let candidates: Vec<Candidate> =
+            spawned.iter().map(|p| Candidate { position: p.position_rest, normal: p.normal_rest }).collect();
         let kept = eliminate(&candidates, spawned.len().div_ceil(2), r_max);
         let mut stays = vec![false; spawned.len()];
         for &i in &kept {
@@ -302,10 +300,7 @@ impl LaidInstance {
 
     fn bounds(&self) -> (Vec3, Vec3) {
         let positions = || self.points.iter().map(|p| p.position_rest);
-        (
-            positions().fold(Vec3::INFINITY, Vec3::min),
-            positions().fold(Vec3::NEG_INFINITY, Vec3::max),
-        )
+        (positions().fold(Vec3::INFINITY, Vec3::min), positions().fold(Vec3::NEG_INFINITY, Vec3::max))
     }
 
     fn extent(&self) -> f32 {

@@ -88,7 +88,8 @@ impl Updater {
         }
         let GeneratedPoints { layout, anchors, .. } = points;
         let patterns = Patterns::new(params.rays);
-        let context = Context { scene, pose, tracer, layout: &layout, anchors: &anchors, patterns: &patterns, params };
+        let context =
+            Context { scene, pose, tracer, layout: &layout, anchors: &anchors, patterns: &patterns, params };
         let done = std::sync::atomic::AtomicUsize::new(0);
         let all: Vec<u32> = (0..anchors.len() as u32).collect();
         let visibility: Vec<u8> = all
@@ -125,12 +126,15 @@ impl Updater {
             self.pose = pose.clone();
             return UpdateReport::default();
         }
-        let bounds_world = instance_bounds(scene, pose);
         // Both ends of the motion can change a point: what arrived now occludes, what left no longer does.
         let mut swept = Vec::new();
-        for (instance, _) in moved.iter().enumerate().filter(|(i, m)| **m && scene.instances[*i].casts) {
-            swept.push(self.bounds_world[instance]);
-            swept.push(bounds_world[instance]);
+        for (instance, _) in moved.iter().enumerate().filter(|(_, moved)| **moved) {
+            let bounds_world = scene.instance_bounds_world(pose, instance);
+            if scene.instances[instance].casts {
+                swept.push(self.bounds_world[instance]);
+                swept.push(bounds_world);
+            }
+            self.bounds_world[instance] = bounds_world;
         }
         self.clusters.refresh(scene, pose, self.store.layout(), &self.anchors, |i| moved[i]);
         let reach = reach_m(self.params.radius_m, &swept);
@@ -138,7 +142,6 @@ impl Updater {
         let candidates = self.clusters.select(scene, pose, &layout, &self.anchors, &moved, &swept, reach);
         let report = self.trace_and_publish(scene, pose, tracer, &candidates);
         self.pose = pose.clone();
-        self.bounds_world = bounds_world;
         report
     }
 
