@@ -94,7 +94,9 @@ pub(crate) fn sphere(center: Vec3, radius: f32, rings: u32, segments: u32) -> Me
         for segment in 0..segments {
             let (a, b) = (at(ring, segment), at(ring + 1, segment));
             let (c, d) = (at(ring + 1, segment + 1), at(ring, segment + 1));
-            triangles.extend([[a, b, c], [a, c, d]].iter().filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]));
+            triangles.extend(
+                [[a, b, c], [a, c, d]].iter().filter(|t| t[0] != t[1] && t[1] != t[2] && t[2] != t[0]),
+            );
         }
     }
     mesh(positions, triangles)

@@ -111,7 +111,8 @@ impl MeshAlpha {
             let first = (part.first_triangle as usize).min(mesh.triangles.len());
             let end = first.saturating_add(part.triangle_count as usize).min(mesh.triangles.len());
             for i in first..end {
-                alpha.of_triangle[i] = alpha.classify(scene, mesh, materials, part.material, mesh.triangles[i]);
+                alpha.of_triangle[i] =
+                    alpha.classify(scene, mesh, materials, part.material, mesh.triangles[i]);
             }
         }
         alpha

@@ -27,11 +27,7 @@ pub(crate) struct MeshBvh {
 
 fn corners(positions: &[Vec3], indices: [u32; 3]) -> [[f32; 3]; 3] {
     let corners = indices.map(|i| positions.get(i as usize).copied().unwrap_or(Vec3::NAN));
-    if corners.iter().all(|c| c.is_finite()) {
-        corners.map(|c| c.to_array())
-    } else {
-        [[f32::NAN; 3]; 3]
-    }
+    if corners.iter().all(|c| c.is_finite()) { corners.map(|c| c.to_array()) } else { [[f32::NAN; 3]; 3] }
 }
 
 fn bounds_of(corners: &[[f32; 3]; 3]) -> Aabb {
@@ -65,9 +61,8 @@ impl MeshBvh {
             triangle.corners = corners(positions, mesh.triangles[triangle.id as usize]);
         }
         let triangles = &self.triangles;
-        self.tree.refit(|range| {
-            triangles[range].iter().fold(Aabb::EMPTY, |b, t| b.union(bounds_of(&t.corners)))
-        });
+        self.tree
+            .refit(|range| triangles[range].iter().fold(Aabb::EMPTY, |b, t| b.union(bounds_of(&t.corners))));
         // A mesh that was a point or a line when it was built has cost 0, and is due for a better tree.
         if self.tree.cost() <= REBUILD_COST_FACTOR * self.built_cost {
             return false;

@@ -58,7 +58,14 @@ fn timing_short_rays() {
         let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
         f64::from((b - a).cross(c - a).length())
     };
-    let sums: Vec<f64> = mesh.triangles.iter().scan(0.0, |s, t| { *s += area(t); Some(*s) }).collect();
+    let sums: Vec<f64> = mesh
+        .triangles
+        .iter()
+        .scan(0.0, |s, t| {
+            *s += area(t);
+            Some(*s)
+        })
+        .collect();
     let total = sums.last().copied().unwrap_or(0.0);
     let mut points: Vec<(u64, Vec3, Vec3)> = (0..20_000)
         .map(|_| {

@@ -85,7 +85,8 @@ fn inverse(m: &Mat3) -> Option<Mat3> {
     };
     let rows = [cross(y, z), cross(z, x), cross(x, y)];
     let determinant = x[0] * rows[0][0] + x[1] * rows[0][1] + x[2] * rows[0][2];
-    let inverse = Mat3::from_cols_array_2d(&rows.map(|row| row.map(|e| (e / determinant) as f32))).transpose();
+    let inverse =
+        Mat3::from_cols_array_2d(&rows.map(|row| row.map(|e| (e / determinant) as f32))).transpose();
     inverse.is_finite().then_some(inverse)
 }
 
@@ -273,7 +274,8 @@ impl Tracer {
         let mut best: Option<Hit> = None;
         self.visit_instances(ray, |placed, instance| {
             let t_best = best.map_or(ray.t_max, |b| b.t);
-            let found = placed.placement.ray(ray).and_then(|r| placed.bvh.closest_hit(&r, t_best, &self.alpha));
+            let found =
+                placed.placement.ray(ray).and_then(|r| placed.bvh.closest_hit(&r, t_best, &self.alpha));
             if let Some((triangle, hit)) = found
                 && best.is_none_or(|b| hit.t < b.t || instance < b.instance)
             {

@@ -41,7 +41,8 @@ fn sin_cos_turns(turns: f32) -> (f32, f32) {
     let quarter = (turns * 4.0 + 0.5) as i32;
     let x = (turns - quarter as f32 * 0.25) * std::f32::consts::TAU;
     let x2 = x * x;
-    let sin = x * (1.0 + x2 * (-1.0 / 6.0 + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5040.0 + x2 * (1.0 / 362_880.0)))));
+    let sin =
+        x * (1.0 + x2 * (-1.0 / 6.0 + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5040.0 + x2 * (1.0 / 362_880.0)))));
     let cos = 1.0 + x2 * (-0.5 + x2 * (1.0 / 24.0 + x2 * (-1.0 / 720.0 + x2 * (1.0 / 40_320.0))));
     match quarter & 3 {
         0 => (sin, cos),
@@ -86,13 +87,9 @@ fn sobol(i: u32) -> [u32; 2] {
     // The second generator is the Pascal triangle modulo 2. Row by row it is a chain of shifted sums, which taken over
     // bits at distances 1, 2, 4, 8, 16 are five steps.
     let mut y = i;
-    for (shift, mask) in [
-        (1, 0x5555_5555_u32),
-        (2, 0x3333_3333),
-        (4, 0x0f0f_0f0f),
-        (8, 0x00ff_00ff),
-        (16, 0x0000_ffff),
-    ] {
+    for (shift, mask) in
+        [(1, 0x5555_5555_u32), (2, 0x3333_3333), (4, 0x0f0f_0f0f), (8, 0x00ff_00ff), (16, 0x0000_ffff)]
+    {
         y ^= (y >> shift) & mask;
     }
     [i, y]
@@ -108,3 +105,6 @@ fn scramble(reversed: u32, seed: u32) -> u32 {
     x ^= x.wrapping_mul(0x8d22_f6e6);
     x.reverse_bits()
 }
+
+#[cfg(test)]
+mod tests;
