@@ -24,9 +24,9 @@ fn visibility(mesh: Mesh, sites: &[Site], rays: u32, radius_m: f32) -> Vec<f32> 
 }
 
 /// The pattern misjudges only the strata that the outline of the occluder crosses: of `n` about √n, each by a random
-/// part, so that the error is of order n^(−3/4). Three of these, and 0.02 % for the lift off the ground and flat facets.
+/// part, so that the error is of order n^(−3/4). One and a half of these, and 0.02 % for the lift off the ground and flat facets.
 fn tolerance(rays: u32) -> f64 {
-    3.0 * libm::pow(f64::from(rays), -0.75) + 2e-4
+    1.5 * libm::pow(f64::from(rays), -0.75) + 2e-4
 }
 
 /// Sites at the origin, normal up, with eight keys.
@@ -37,7 +37,6 @@ fn at_origin() -> Vec<Site> {
 fn expect(values: &[f32], exact: f64, rays: u32, what: &str) {
     for v in values {
         let error = (f64::from(*v) - exact).abs();
-        eprintln!("RATIO {:.2} {what}", (error - 2e-4) * libm::pow(f64::from(rays), 0.75));
         assert!(error <= tolerance(rays), "{what}: {v} instead of {exact}, {rays} rays");
     }
 }
@@ -218,27 +217,4 @@ fn parameters_out_of_range() {
     let most = visibility(lid, &sites[..1], u32::MAX, UNLIMITED)[0];
     assert_eq!(most, (most * 65536.0).round() / 65536.0);
     assert!(visibility(mesh(vec![], vec![]), &[], 16, 1.0).is_empty());
-}
-#[test]
-fn debug_wall() {
-    let (d, half, height) = (1.0, 1e4, 3.0);
-    let wall = quad(Vec3::new(d, 0.0, -half), Vec3::new(d, 0.0, half), Vec3::new(d, height, half), Vec3::new(d, height, -half));
-    let (scene, pose) = scene_of(wall);
-    let tracer = Tracer::new(&scene, &pose);
-    let mut out = vec![];
-    let n = Vec3::Y;
-    let o = crate::offset_origin(Vec3::ZERO, n);
-    let (t, b) = crate::sampling::orthonormal_basis(n);
-    for site in 0..1 {
-    crate::sampling::fixed_pattern(65536, crate::sampling::hash(3, site, 0), &mut out);
-    let (mut e, mut m, mut shown) = (0, 0, 0);
-    for dd in &out {
-        let d3 = t * dd.x + b * dd.y + n * dd.z;
-        let exact = d3.x > 0.0 && (f64::from(d3.y) / f64::from(d3.x) + f64::from(o.y)) < 3.0 && (d3.z / d3.x).abs() < 1e4;
-        let got = tracer.occluded(&crate::Ray { origin_world: o, direction_world: d3, t_max: UNLIMITED });
-        e += exact as u32; m += got as u32;
-        if exact != got && shown < 10 { shown += 1; eprintln!("DBG {d3} {exact} {got} y {} z {}", d3.y / d3.x, d3.z/d3.x); }
-    }
-    eprintln!("DBG {e} {m} {}", 65536.0 * (1.0 - 0.658113883008419));
-    }
 }
