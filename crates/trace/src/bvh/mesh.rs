@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::alpha::{AlphaMaterials, HOLE, MeshAlpha};
 use super::build::build;
 use super::tree::{CONSERVATIVE, Child, Node, Tree, WIDTH};
-use super::triangle::{MeshRay, Triangle, TriangleHit, intersect};
+use super::triangle::{MeshRay, Triangle, TriangleHit, intersect, max, min};
 
 /// Rebuild instead of refit once the expected cost of a ray has grown by this factor.
 const REBUILD_COST_FACTOR: f64 = 1.5;
@@ -192,18 +192,6 @@ impl NearFar {
         }
         (mask, near)
     }
-}
-
-/// One instruction, unlike [`f32::min`], which must care for NaN.
-#[inline(always)]
-pub(crate) fn min(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-/// One instruction, unlike [`f32::max`].
-#[inline(always)]
-pub(crate) fn max(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }
 
 /// Nodes still to visit. Lives on the stack unless the tree is degenerate.

@@ -7,9 +7,11 @@
 use dapple_scene::glam::Vec3;
 
 use super::alpha::AlphaMaterials;
-use super::mesh::{MeshBvh, max, min};
+use super::mesh::MeshBvh;
 use super::tree::{CONSERVATIVE, Child, Node};
-use super::triangle::{MeshRay, Triangle, axes_around, finite_inverse, intersect, main_axis};
+use super::triangle::{
+    MeshRay, Plane, Triangle, axes_around, finite_inverse, intersect, main_axis, max, min,
+};
 
 /// Rays in a packet: one bit each.
 pub(crate) const PACKET: usize = 64;
@@ -29,6 +31,7 @@ pub(crate) struct Packet {
     /// Around all rays.
     min: Vec3,
     max: Vec3,
+    directions: [[f32; 3]; PACKET],
     /// As in [`MeshRay`], side by side.
     inverse: [Lanes; 3],
     shear: [Lanes; 3],
@@ -55,6 +58,7 @@ impl Packet {
             t_max: 0.0,
             min: Vec3::ZERO,
             max: Vec3::ZERO,
+            directions: [[0.0; 3]; PACKET],
             inverse: [zero; 3],
             shear: [zero; 3],
             along: [0; 3],
@@ -99,6 +103,7 @@ impl Packet {
                 for (row, x) in self.shear.iter_mut().zip([d[kx] / d[kz], d[ky] / d[kz], 1.0 / d[kz]]) {
                     row[chunk][at] = x;
                 }
+                self.directions[lane] = d;
                 self.source[lane] = i as u8;
                 lane += 1;
             }
@@ -160,6 +165,7 @@ impl Packet {
         let axis = (0..3).find(|&a| self.along[a] >> lane & 1 != 0).unwrap_or(2);
         MeshRay {
             origin: self.origin,
+            direction: self.directions[lane],
             inverse: [0, 1, 2].map(|a| self.inverse[a][chunk][at]),
             axes: axes_around(axis),
             shear: [0, 1, 2].map(|a| self.shear[a][chunk][at]),
@@ -218,6 +224,7 @@ impl Packet {
         open: &mut u64,
     ) -> u64 {
         let (mut sure, mut unsure) = (0_u64, 0_u64);
+        let mut plane = None;
         for axis in 0..3 {
             let group = rays & self.along[axis];
             if group == 0 {
@@ -225,13 +232,24 @@ impl Packet {
             }
             let axes = axes_around(axis);
             let corners = triangle.corners.map(|c| axes.map(|k| c[k] - self.origin[k]));
+            let mut inside = 0;
             for chunk in 0..CHUNKS {
                 if group >> (chunk * LANES) & low_bits(LANES) == 0 {
                     continue;
                 }
-                let (hit, ask) = self.lanes_hit(chunk, &corners);
-                sure |= u64::from(hit) << (chunk * LANES) & group;
+                let (within, ask) = self.lanes_inside(chunk, &corners);
+                inside |= u64::from(within) << (chunk * LANES) & group;
                 unsure |= u64::from(ask) << (chunk * LANES) & group;
+            }
+            while inside != 0 {
+                let lane = inside.trailing_zeros() as usize;
+                inside &= inside - 1;
+                let plane = plane.get_or_insert_with(|| Plane::new(&triangle.corners, &self.origin));
+                let sz = self.shear[2][lane / LANES][lane % LANES];
+                let corner_t = corners.map(|c| sz * c[2]);
+                if plane.distance(&self.directions[lane], corner_t, self.t_max).is_some() {
+                    sure |= 1 << lane;
+                }
             }
         }
         if triangle.alpha != super::alpha::OPAQUE {
@@ -250,31 +268,27 @@ impl Packet {
         sure
     }
 
-    /// Lanes that hit a triangle (corners relative to the origin, in the order of the lanes' axes), and lanes that
-    /// need the exact test.
+    /// Lanes whose line passes inside a triangle (corners relative to the origin, in the order of the lanes' axes),
+    /// and lanes that need the exact test.
     #[inline(always)]
-    fn lanes_hit(&self, chunk: usize, corners: &[[f32; 3]; 3]) -> (u32, u32) {
-        let (sx, sy, sz) = (&self.shear[0][chunk], &self.shear[1][chunk], &self.shear[2][chunk]);
+    fn lanes_inside(&self, chunk: usize, corners: &[[f32; 3]; 3]) -> (u32, u32) {
+        let (sx, sy) = (&self.shear[0][chunk], &self.shear[1][chunk]);
         let [[ax0, ay0, az0], [bx0, by0, bz0], [cx0, cy0, cz0]] = *corners;
-        let t_max = self.t_max;
-        let (mut hits, mut ask) = (0_u32, 0_u32);
+        let (mut inside, mut ask) = (0_u32, 0_u32);
         for i in 0..LANES {
-            let (ax, ay, az) = (ax0 - sx[i] * az0, ay0 - sy[i] * az0, sz[i] * az0);
-            let (bx, by, bz) = (bx0 - sx[i] * bz0, by0 - sy[i] * bz0, sz[i] * bz0);
-            let (cx, cy, cz) = (cx0 - sx[i] * cz0, cy0 - sy[i] * cz0, sz[i] * cz0);
+            let (ax, ay) = (ax0 - sx[i] * az0, ay0 - sy[i] * az0);
+            let (bx, by) = (bx0 - sx[i] * bz0, by0 - sy[i] * bz0);
+            let (cx, cy) = (cx0 - sx[i] * cz0, cy0 - sy[i] * cz0);
             let u = cx * by - cy * bx;
             let v = ax * cy - ay * cx;
             let w = bx * ay - by * ax;
             let miss = ((u < 0.0) | (v < 0.0) | (w < 0.0)) & ((u > 0.0) | (v > 0.0) | (w > 0.0));
             let det = u + v + w;
             let exact = (u == 0.0) | (v == 0.0) | (w == 0.0) | !(det.abs() < f32::INFINITY);
-            let t = u * az + v * bz + w * cz;
-            let (t, area) = if det < 0.0 { (-t, -det) } else { (t, det) };
-            let within = (t > 0.0) & (t <= t_max * area);
-            hits |= u32::from(!miss & !exact & within) << i;
+            inside |= u32::from(!miss & !exact) << i;
             ask |= u32::from(!miss & exact) << i;
         }
-        (hits, ask)
+        (inside, ask)
     }
 }
 

@@ -2,12 +2,12 @@
 
 use std::time::Instant;
 
-use dapple_scene::glam::Vec3;
+use dapple_scene::glam::{Affine3A, Vec3};
 
 use super::{Tracer, count_blocked, offset_origin};
 use crate::sampling::{fixed_pattern, hash, orthonormal_basis};
-use crate::test_support::{Random, cube, joined, scene_of, sphere};
-use dapple_scene::{Mesh, Pose, Scene};
+use crate::test_support::{Random, cube, deform, joined, scene, scene_of, sphere};
+use dapple_scene::Mesh;
 
 fn moved(mut mesh: Mesh, scale: Vec3, by: Vec3) -> Mesh {
     for p in &mut mesh.positions {
@@ -17,7 +17,7 @@ fn moved(mut mesh: Mesh, scale: Vec3, by: Vec3) -> Mesh {
 }
 
 /// 30 × 12 × 20 m: walls, two storeys of columns with round capitals, rails of small balls. About 200k triangles.
-fn atrium() -> (Scene, Pose) {
+fn atrium() -> Vec<Mesh> {
     let mut parts = vec![
         moved(cube(), Vec3::new(30.0, 0.2, 20.0), Vec3::new(-15.0, -0.2, -10.0)),
         moved(cube(), Vec3::new(30.0, 12.0, 0.2), Vec3::new(-15.0, 0.0, -10.2)),
@@ -40,19 +40,11 @@ fn atrium() -> (Scene, Pose) {
             }
         }
     }
-    scene_of(joined(parts))
+    parts
 }
 
-#[test]
-#[ignore = "timing, run by hand"]
-fn timing_short_rays() {
-    let (scene, pose) = atrium();
-    let mesh = &scene.meshes[0];
-    let start = Instant::now();
-    let tracer = Tracer::new(&scene, &pose);
-    println!("{} triangles, built in {:.0} ms", mesh.triangles.len(), start.elapsed().as_secs_f64() * 1e3);
-
-    // Points spread over the surface by area, neighbours in space next to each other.
+/// Points with normals spread over the surface by area, neighbours in space next to each other.
+fn points_on(mesh: &Mesh) -> Vec<(u64, Vec3, Vec3)> {
     let mut random = Random(0);
     let area = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
@@ -86,7 +78,10 @@ fn timing_short_rays() {
         })
         .collect();
     points.sort_by_key(|p| p.0);
+    points
+}
 
+fn time_queries(tracer: &Tracer, points: &[(u64, Vec3, Vec3)]) {
     for (rays, t_max, step) in
         [(64, 0.6, 1), (256, 0.6, 4), (64, 9.0, 4), (64, f32::INFINITY, 8), (16, 0.6, 1)]
     {
@@ -109,5 +104,40 @@ fn timing_short_rays() {
             100.0 * blocked as f64 / traced as f64,
             traced as f64 / patterns / 1e6
         );
+    }
+}
+
+#[test]
+#[ignore = "timing, run by hand"]
+fn timing_occlusion() {
+    let parts = atrium();
+    let whole = joined(parts.iter().cloned());
+    let points = points_on(&whole);
+    let instances: Vec<_> = (0..parts.len()).map(|i| (i as u32, Affine3A::IDENTITY)).collect();
+    for (name, (scene, pose)) in [("one mesh", scene_of(whole)), ("in instances", scene(parts, &instances))] {
+        let start = Instant::now();
+        let tracer = Tracer::new(&scene, &pose);
+        let triangles: usize = scene.meshes.iter().map(|m| m.triangles.len()).sum();
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        println!("{name}: {triangles} triangles, {} instances, built in {ms:.0} ms", scene.instances.len());
+        time_queries(&tracer, &points);
+    }
+}
+
+#[test]
+#[ignore = "timing, run by hand"]
+fn timing_update() {
+    let ball = sphere(Vec3::Y, 0.5, 60, 84);
+    let balls: Vec<_> = (0..1000).map(|i| (0, Affine3A::from_translation(Vec3::X * i as f32))).collect();
+    let (scene, mut pose) = scene(vec![ball], &balls);
+    let mut tracer = Tracer::new(&scene, &pose);
+    let mesh = &scene.meshes[0];
+    for frame in 0..4 {
+        let wave = |p: &Vec3| *p + Vec3::X * (0.05 * frame as f32 * p.y);
+        deform(&mut pose, 500, mesh.positions.iter().map(wave).collect());
+        let start = Instant::now();
+        tracer.update(&scene, &pose);
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        println!("{} deformed triangles and 1000 instances updated in {ms:.2} ms", mesh.triangles.len());
     }
 }

@@ -21,6 +21,7 @@ pub(crate) struct Triangle {
 #[derive(Clone, Copy)]
 pub(crate) struct MeshRay {
     pub(crate) origin: [f32; 3],
+    pub(crate) direction: [f32; 3],
     /// 1 / direction, finite also where the direction has no such component.
     pub(crate) inverse: [f32; 3],
     /// Axes: the two across and the one along the shear.
@@ -53,6 +54,7 @@ impl MeshRay {
         let axes = axes_around(along);
         Some(MeshRay {
             origin: origin.to_array(),
+            direction: d,
             inverse: d.map(finite_inverse),
             axes,
             shear: [d[axes[0]] / d[along], d[axes[1]] / d[along], scale],
@@ -107,27 +109,20 @@ pub(crate) fn intersect(ray: &MeshRay, triangle: &Triangle) -> Option<TriangleHi
         return None;
     }
     let det = u + v + w;
-    let flip = sz < 0.0;
-    if (u == 0.0) | (v == 0.0) | (w == 0.0) | !(det.abs() < f32::INFINITY) {
-        return exact(ray.t_max, [ax, ay, az], [bx, by, bz], [cx, cy, cz], flip);
-    }
-    let t = u * az + v * bz + w * cz;
-    let (t, area) = if det < 0.0 { (-t, -det) } else { (t, det) };
-    if !((t > 0.0) & (t <= ray.t_max * area)) {
-        return None;
-    }
-    let inverse = 1.0 / det;
-    Some(TriangleHit {
-        t: t / area,
-        weights: [u * inverse, v * inverse, w * inverse],
-        back_face: (det < 0.0) != flip,
-    })
+    let weights = if (u == 0.0) | (v == 0.0) | (w == 0.0) | !(det.abs() < f32::INFINITY) {
+        exact_weights([ax, ay], [bx, by], [cx, cy])?
+    } else {
+        [u / det, v / det, w / det]
+    };
+    let plane = Plane::new(&triangle.corners, o);
+    let (t, back_face) = plane.distance(&ray.direction, [az, bz, cz], ray.t_max)?;
+    Some(TriangleHit { t, weights, back_face })
 }
 
-/// [`intersect`] from sheared corners, in `f64`: for rays through an edge or a corner and for huge numbers.
+/// The corner weights from sheared corners, in `f64`: for rays through an edge or a corner and for huge numbers.
 #[cold]
-fn exact(t_max: f32, a: [f32; 3], b: [f32; 3], c: [f32; 3], flip: bool) -> Option<TriangleHit> {
-    let ([ax, ay, az], [bx, by, bz], [cx, cy, cz]) = (a.map(f64::from), b.map(f64::from), c.map(f64::from));
+fn exact_weights(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> Option<[f32; 3]> {
+    let ([ax, ay], [bx, by], [cx, cy]) = (a.map(f64::from), b.map(f64::from), c.map(f64::from));
     let u = cx * by - cy * bx;
     let v = ax * cy - ay * cx;
     let w = bx * ay - by * ax;
@@ -135,13 +130,56 @@ fn exact(t_max: f32, a: [f32; 3], b: [f32; 3], c: [f32; 3], flip: bool) -> Optio
         return None;
     }
     let det = u + v + w;
-    if !(det.abs() > 0.0 && det.abs() < f64::INFINITY) {
-        return None;
+    let sound = det.abs() > 0.0 && det.abs() < f64::INFINITY;
+    sound.then(|| [u / det, v / det, w / det].map(|x| x as f32))
+}
+
+/// The plane of a triangle relative to an origin, in `f64`.
+///
+/// The edge functions' own t is as inexact as the triangle is long: near the foot of a wall of 10 km it can have the
+/// wrong sign. Few triangles are met, so those can be measured well.
+pub(crate) struct Plane {
+    normal: [f64; 3],
+    height: f64,
+}
+
+impl Plane {
+    #[inline(always)]
+    pub(crate) fn new(corners: &[[f32; 3]; 3], origin: &[f32; 3]) -> Plane {
+        let [a, b, c] = corners.map(|c| [0, 1, 2].map(|k| f64::from(c[k]) - f64::from(origin[k])));
+        let (e, f) = ([b[0] - a[0], b[1] - a[1], b[2] - a[2]], [c[0] - a[0], c[1] - a[1], c[2] - a[2]]);
+        let normal = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
+        Plane { normal, height: normal[0] * a[0] + normal[1] * a[1] + normal[2] * a[2] }
     }
-    let t = (u * az + v * bz + w * cz) / det;
-    if !(t > 0.0 && t <= f64::from(t_max)) {
-        return None;
+
+    /// t if the ray from the origin meets the plane at 0 < t ≤ t_max, and whether it leaves along the normal.
+    ///
+    /// `corner_t` are the corners' distances along the ray; what lies between them is between theirs, which keeps t
+    /// sound where the plane is seen almost edge-on.
+    #[inline(always)]
+    pub(crate) fn distance(
+        &self,
+        direction: &[f32; 3],
+        corner_t: [f32; 3],
+        t_max: f32,
+    ) -> Option<(f32, bool)> {
+        let [n, d] = [self.normal, direction.map(f64::from)];
+        let along = n[0] * d[0] + n[1] * d[1] + n[2] * d[2];
+        let t = (self.height / along) as f32;
+        let [a, b, c] = corner_t;
+        let t = max(min(t, max(max(a, b), c)), min(min(a, b), c));
+        (t > 0.0 && t <= t_max && along != 0.0).then_some((t, along > 0.0))
     }
-    let weights = [u / det, v / det, w / det].map(|x| x as f32);
-    Some(TriangleHit { t: t as f32, weights, back_face: (det < 0.0) != flip })
+}
+
+/// One instruction, unlike [`f32::min`], which must care for NaN: `b` if either is.
+#[inline(always)]
+pub(crate) fn min(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// One instruction, unlike [`f32::max`]: `b` if either is NaN.
+#[inline(always)]
+pub(crate) fn max(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }

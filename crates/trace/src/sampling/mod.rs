@@ -105,3 +105,6 @@ fn scramble(reversed: u32, seed: u32) -> u32 {
     x ^= x.wrapping_mul(0x8d22_f6e6);
     x.reverse_bits()
 }
+
+#[cfg(test)]
+mod tests;
