@@ -12,7 +12,7 @@ demo:
 	@bash scripts/setup.sh
 	cargo run --release --package dapple -- eval --out out/demo
 	@echo
-	@echo "The report: file://$(REPORT)/index.html"
+	@echo "The report: file://$(REPORT)/report.html"
 
 # All checks and tests; what CI runs.
 test:

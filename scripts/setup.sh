@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs what a build needs and this machine lacks, where apt-get and the rights to use it are at hand.
 #
-# scripts/setup.sh          for `make demo`: a C and C++ compiler (FLIP and zstd are compiled from source) and Rust
+# scripts/setup.sh          for `make demo`: make, a C and C++ compiler (FLIP and zstd come as source) and Rust
 # scripts/setup.sh test     for `make test`: the same, and git, rustfmt and clippy
 #
 # Rust itself is not installed for you; the message says how.
@@ -14,7 +14,7 @@ stop() { printf 'setup: %s\n' "$@" >&2; exit 1; }
 # --- packages ---------------------------------------------------------------------------------------------------
 
 missing=()
-has cc && has c++ || missing+=(build-essential)
+has cc && has c++ && has make || missing+=(build-essential)
 if [ "${1:-}" = test ]; then has git || missing+=(git); fi
 # Only rustup's installer needs it.
 if ! has cargo; then has curl || missing+=(curl ca-certificates); fi
