@@ -1,1 +1,55 @@
-fn main() {}
+//! The project's own checks: `cargo xtask ci` is the one definition of "checked".
+
+mod markdown;
+mod seams;
+mod skipped;
+mod steps;
+mod tidy;
+
+use anyhow::{Context, Result};
+use clap::{Parser, Subcommand};
+
+use steps::{Runner, Step};
+
+/// Checks and tests of the Dapple workspace.
+#[derive(Parser)]
+#[command(name = "cargo xtask")]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand, Clone, Copy)]
+enum Task {
+    /// Formatting, lints, the direction of dependencies, tidiness.
+    Check,
+    /// All tests and documentation examples (by cargo-nextest where it is installed).
+    Test,
+    /// Tidiness only: file heads and lengths, links, machine paths, golden images ...
+    Tidy,
+    /// Everything: check, the smoke evaluation, test.
+    Ci,
+}
+
+fn main() -> Result<()> {
+    let task = Arguments::parse().task;
+    let metadata = cargo_metadata::MetadataCommand::new()
+        .no_deps()
+        .exec()
+        .context("cannot read the workspace: run this inside it, as `cargo xtask ...`")?;
+    let mut runner = Runner::new(metadata);
+    let check = [Step::Format, Step::Clippy, Step::ThinClient, Step::Seams, Step::Tidy];
+    // The test runner's summary comes last, where readers and scripts look for it.
+    let test = [Step::DocTests, Step::Tests];
+    match task {
+        Task::Check => runner.run(&check),
+        Task::Test => runner.run(&test),
+        Task::Tidy => runner.run(&[Step::Tidy]),
+        Task::Ci => {
+            runner.run(&check);
+            runner.run(&[Step::Smoke]);
+            runner.run(&test);
+        }
+    }
+    runner.finish()
+}

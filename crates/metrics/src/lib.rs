@@ -1,1 +1,23 @@
-//! dapple-metrics
+//! Images to numbers: how far a picture is from the truth. Depends on no other part of Dapple, so that the
+//! judge does not depend on the judged.
+//!
+//! Inputs are plain slices and sizes; rows run from the top, channels are interleaved. Loops run in the
+//! caller's rayon pool and sum in a fixed order, so results do not depend on the thread count.
+//!
+//! | metric | better is | input |
+//! |---|---|---|
+//! | [`psnr()`] | higher, ∞ when equal | any number of channels, any range |
+//! | [`ssim()`] | higher, 1 when equal | luma, 0 … 1 |
+//! | [`flip()`] | lower, 0 when equal | sRGB, 8 bits a channel |
+
+mod error;
+mod flip;
+mod psnr;
+mod ssim;
+#[cfg(test)]
+mod test_images;
+
+pub use error::MetricError;
+pub use flip::{Flip, PIXELS_PER_DEGREE, flip, magma_srgb8};
+pub use psnr::{psnr, psnr_masked};
+pub use ssim::{SSIM_MIN_SIDE, ssim};

@@ -1,0 +1,26 @@
+# Thin on purpose: what is checked, and how, is `cargo xtask`.
+
+# rustup's folder, for shells that were opened before it was installed.
+export PATH := $(PATH):$(HOME)/.cargo/bin
+
+REPORT := $(CURDIR)/out/demo
+
+.PHONY: demo test check fmt
+
+# The whole loop on the built-in scene, and a report of it.
+demo:
+	@bash scripts/setup.sh
+	cargo run --release --package dapple -- eval --out out/demo
+	@echo
+	@echo "The report: file://$(REPORT)/report.html"
+
+# All checks and tests; what CI runs.
+test:
+	@bash scripts/setup.sh test
+	cargo xtask ci
+
+check:
+	cargo xtask check
+
+fmt:
+	cargo fmt --all

@@ -1,0 +1,62 @@
+#!/usr/bin/env bash
+# Installs what a build needs and this machine lacks, where apt-get and the rights to use it are at hand.
+#
+# scripts/setup.sh          for `make demo`: make, a C and C++ compiler (FLIP and zstd come as source) and Rust
+# scripts/setup.sh test     for `make test`: the same, and git, rustfmt and clippy
+#
+# Rust itself is not installed for you; the message says how.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+has() { command -v "$1" >/dev/null 2>&1; }
+stop() { printf 'setup: %s\n' "$@" >&2; exit 1; }
+
+# --- packages ---------------------------------------------------------------------------------------------------
+
+missing=()
+has cc && has c++ && has make || missing+=(build-essential)
+if [ "${1:-}" = test ]; then has git || missing+=(git); fi
+# Only rustup's installer needs it.
+if ! has cargo; then has curl || missing+=(curl ca-certificates); fi
+
+if [ ${#missing[@]} -gt 0 ]; then
+    has apt-get || stop "missing: ${missing[*]} (Debian's names), and there is no apt-get here." \
+        "Install a C and a C++ compiler, git and curl by your system's means, then run this again."
+    if [ "$(id -u)" -eq 0 ]; then
+        as_root=()
+    elif has sudo && sudo -n true 2>/dev/null; then
+        as_root=(sudo -n)
+    else
+        stop "missing: ${missing[*]}, and there are no rights to install them. Run:" \
+            "    sudo apt-get install ${missing[*]}"
+    fi
+    echo "setup: installing ${missing[*]}"
+    "${as_root[@]}" apt-get update -qq </dev/null
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
+        "${missing[@]}" </dev/null
+fi
+
+# --- Rust -------------------------------------------------------------------------------------------------------
+
+wanted=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
+how="Get it from https://rustup.rs:
+    curl --proto '=https' --tlsv1.2 -sSf https://sh.rustup.rs | sh -s -- -y
+then open a new shell, or run: . \"\$HOME/.cargo/env\""
+
+has cargo && has rustc || stop "Rust $wanted or newer is needed, and there is none on the PATH." "$how"
+
+found=$(rustc --version | cut -d' ' -f2)
+oldest=$(printf '%s\n' "$wanted" "${found%%-*}" | sort -V | head -n 1)
+if [ "$oldest" != "$wanted" ]; then
+    if has rustup; then how="Run: rustup update stable"; fi
+    stop "Rust $wanted or newer is needed; this is $found." "$how"
+fi
+
+if [ "${1:-}" = test ]; then
+    for component in fmt:rustfmt clippy:clippy; do
+        if ! cargo "${component%%:*}" --version >/dev/null 2>&1; then
+            has rustup || stop "cargo ${component%%:*} is missing: install ${component##*:} with your Rust."
+            rustup component add "${component##*:}"
+        fi
+    done
+fi

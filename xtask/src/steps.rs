@@ -1,0 +1,168 @@
+//! The steps of a check, run one after the other; a failure is noted and the rest still runs.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, bail};
+use cargo_metadata::Metadata;
+
+use crate::{seams, skipped, tidy};
+
+/// One thing that can pass or fail.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// `cargo fmt --check`.
+    Format,
+    /// Clippy on everything, warnings denied.
+    Clippy,
+    /// Clippy on the thin client with no optional feature: it must build without what only servers need.
+    ThinClient,
+    /// The dependency tables of `ARCHITECTURE.md` against the manifests.
+    Seams,
+    /// See [`tidy`].
+    Tidy,
+    /// The whole loop on a small scene, by the command itself.
+    Smoke,
+    /// Documentation examples.
+    DocTests,
+    /// All other tests.
+    Tests,
+}
+
+impl Step {
+    fn name(self) -> &'static str {
+        match self {
+            Step::Format => "format",
+            Step::Clippy => "clippy",
+            Step::ThinClient => "thin client",
+            Step::Seams => "seams",
+            Step::Tidy => "tidy",
+            Step::Smoke => "smoke evaluation",
+            Step::DocTests => "documentation examples",
+            Step::Tests => "tests",
+        }
+    }
+}
+
+/// Runs steps and remembers how they ended.
+pub(crate) struct Runner {
+    metadata: Metadata,
+    passed: Vec<Step>,
+    failed: Vec<Step>,
+    skipped: Vec<String>,
+}
+
+impl Runner {
+    /// For the workspace that `metadata` describes.
+    pub(crate) fn new(metadata: Metadata) -> Self {
+        Self { metadata, passed: Vec::new(), failed: Vec::new(), skipped: Vec::new() }
+    }
+
+    /// Runs the steps in order.
+    pub(crate) fn run(&mut self, steps: &[Step]) {
+        for &step in steps {
+            println!("\n== {}", step.name());
+            match self.run_step(step) {
+                Ok(()) => self.passed.push(step),
+                Err(error) => {
+                    eprintln!("{}: {error:#}", step.name());
+                    self.failed.push(step);
+                }
+            }
+        }
+    }
+
+    /// Prints what was skipped, passed and failed; an error if anything failed.
+    pub(crate) fn finish(self) -> Result<()> {
+        println!();
+        for line in &self.skipped {
+            println!("{line}");
+        }
+        if !self.passed.is_empty() {
+            println!("passed: {}", names(&self.passed));
+        }
+        if !self.failed.is_empty() {
+            bail!("failed: {}", names(&self.failed));
+        }
+        Ok(())
+    }
+
+    fn run_step(&mut self, step: Step) -> Result<()> {
+        match step {
+            Step::Format => self.cargo(&["fmt", "--all", "--check"]),
+            Step::Clippy => self.cargo(&[
+                "clippy",
+                "--workspace",
+                "--all-targets",
+                "--all-features",
+                "--",
+                "--deny=warnings",
+            ]),
+            Step::ThinClient => self.cargo(&[
+                "clippy",
+                "--package=dapple-client",
+                "--no-default-features",
+                "--",
+                "--deny=warnings",
+            ]),
+            Step::Seams => seams::check(&self.metadata),
+            Step::Tidy => tidy::check(self.root()),
+            Step::Smoke => {
+                self.cargo(&["run", "--profile=dev", "--quiet", "--package=dapple", "--", "eval", "--smoke"])
+            }
+            Step::DocTests => self.cargo(&["test", "--doc", "--workspace", "--all-features"]),
+            Step::Tests => self.tests(),
+        }
+    }
+
+    fn tests(&mut self) -> Result<()> {
+        let nextest =
+            self.command(&["nextest", "--version"]).stdout(Stdio::null()).stderr(Stdio::null()).status();
+        if !nextest.is_ok_and(|status| status.success()) {
+            println!("cargo-nextest is not installed: cargo's own runner is used");
+            return self.cargo(&[
+                "test",
+                "--workspace",
+                "--all-targets",
+                "--all-features",
+                "--no-fail-fast",
+                "--",
+                "--show-output",
+            ]);
+        }
+        let report = self.metadata.target_directory.join("nextest/default/junit.xml");
+        // Only this run's report counts; that there is none yet is no error.
+        let _ = std::fs::remove_file(&report);
+        let outcome = self.cargo(&["nextest", "run", "--workspace", "--all-features"]);
+        match std::fs::read_to_string(&report) {
+            Ok(text) => self.skipped = skipped::skipped_lines(&text),
+            Err(error) => eprintln!("cannot list what was skipped: {report}: {error}"),
+        }
+        outcome
+    }
+
+    fn root(&self) -> &Path {
+        self.metadata.workspace_root.as_std_path()
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+        let mut command = Command::new(cargo);
+        command.args(arguments).current_dir(self.root()).stdin(Stdio::null());
+        command
+    }
+
+    fn cargo(&self, arguments: &[&str]) -> Result<()> {
+        let line = format!("cargo {}", arguments.join(" "));
+        println!("{line}");
+        let status = self.command(arguments).status().with_context(|| format!("cannot start `{line}`"))?;
+        if !status.success() {
+            bail!("`{line}` ended with {status}");
+        }
+        Ok(())
+    }
+}
+
+fn names(steps: &[Step]) -> String {
+    steps.iter().map(|s| s.name()).collect::<Vec<_>>().join(", ")
+}
