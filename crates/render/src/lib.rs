@@ -1,2 +1,27 @@
-//! dapple-render
+//! The client's drawing passes as deterministic CPU code over slices.
+//!
+//! These twins define what a picture is: shaders must agree with them, and where there is no graphics driver they
+//! are what runs. The order of a frame is
+//!
+//! ```text
+//! gbuffer::rasterize ─► shade::render_shadow_maps ─► shade::shade ─► compose::compose ─► image::LinearImage::to_rgb8
+//!        └► (visibility per sample, from a store or a screen-space method) ─────┘
+//! ```
+//!
+//! Results do not depend on the number of threads nor on the machine: loops run in the caller's rayon pool, and all
+//! transcendental functions come from `libm`.
+
+mod error;
+mod projection;
+#[cfg(test)]
+mod testing;
+mod texture;
+
+pub mod compose;
+pub mod gbuffer;
+pub mod image;
 pub mod psao;
+
+pub mod shade;
+
+pub use error::RenderError;
