@@ -64,7 +64,7 @@ impl Client {
     /// Takes one frame off the wire. On an error nothing has changed.
     pub fn receive(&mut self, bytes: &[u8]) -> Result<Applied, ReceiveError> {
         let applied = self.subscriber.receive(bytes)?;
-        if matches!(applied, Applied::NewLayout { .. }) {
+        if matches!(applied, Applied::NewLayout) {
             self.index = self.subscriber.store().map(|store| PointIndex::new(store.layout()));
         }
         Ok(applied)

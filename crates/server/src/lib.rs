@@ -50,8 +50,8 @@ pub enum ServerError {
 /// What one step did.
 #[derive(Clone, Debug, Default)]
 pub struct StepReport {
-    /// What subscribers that are up to date must receive, in order; empty when nothing changed.
-    pub frames: Vec<Frame>,
+    /// What subscribers that are up to date must receive; nothing when nothing changed.
+    pub frame: Option<Frame>,
     /// Points traced.
     pub traced: u32,
     /// Rays traced.
@@ -66,6 +66,8 @@ pub struct Server {
     tracer: Tracer,
     updater: Updater,
     publisher: Publisher,
+    /// Number of the last update.
+    epoch: u64,
     dropped_inside: u32,
 }
 
@@ -97,8 +99,8 @@ impl Server {
         let tracing = |done| progress(Progress::Tracing(done, count));
         let updater = Updater::new(&scene, &pose, &tracer, points, config.update, &tracing)?;
         let mut publisher = Publisher::new(scene.hash().0, config.publish);
-        publisher.publish(updater.store(), &[])?;
-        Ok(Server { scene, tracer, updater, publisher, dropped_inside })
+        publisher.publish(0, updater.store())?;
+        Ok(Server { scene, tracer, updater, publisher, epoch: 0, dropped_inside })
     }
 
     /// Brings the scene to `now_s` (seconds) and publishes what changed. Time may run in any direction.
@@ -106,18 +108,19 @@ impl Server {
         let pose = self.scene.pose(now_s);
         self.tracer.update(&self.scene, &pose);
         let report = self.updater.step(&self.scene, &pose, &self.tracer);
-        let frames = self.publisher.publish(self.updater.store(), &report.changes)?;
+        self.epoch += 1;
+        let frame = self.publisher.publish(self.epoch, self.updater.store())?;
         Ok(StepReport {
-            frames,
+            frame,
             traced: report.traced,
             rays: report.rays,
             changed: report.changes.len() as u32,
         })
     }
 
-    /// What a subscriber that joins now must receive, in order.
-    pub fn join(&self) -> Vec<Frame> {
-        self.publisher.join()
+    /// The snapshot that brings a subscriber that joins now up to date. Encoded at most once an update.
+    pub fn join(&mut self) -> Result<Option<Frame>, ServerError> {
+        Ok(self.publisher.join()?)
     }
 
     /// What has been published.

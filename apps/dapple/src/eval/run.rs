@@ -50,7 +50,7 @@ impl Pair {
             self.server_seconds += start.elapsed().as_secs_f64();
             self.rays += report.rays;
             let start = Instant::now();
-            for frame in &report.frames {
+            if let Some(frame) = &report.frame {
                 self.delta_bytes += frame.bytes.len() as u64;
                 self.client.receive(&frame.bytes).context("the client refused the server's frame")?;
             }
@@ -171,12 +171,12 @@ fn start_servers(loaded: &Loaded, settings: &Settings, pose: &Pose, tracer: &Tra
                 }
             };
             let rays = points.anchors.len() as u64 * u64::from(update.rays);
-            let server =
+            let mut server =
                 Server::with_points(scene.clone(), pose.clone(), tracer.clone(), points.clone(), &config, &progress)?;
             let mut client = Client::new(scene.clone(), Limits::default());
             let mut snapshot_bytes = 0;
-            for frame in server.join() {
-                snapshot_bytes += frame.bytes.len() as u64;
+            if let Some(frame) = server.join()? {
+                snapshot_bytes = frame.bytes.len() as u64;
                 client.receive(&frame.bytes).context("the client refused the server's snapshot")?;
             }
             pairs.push(Pair {
