@@ -7,18 +7,25 @@
 
 mod animation;
 mod camera;
+mod hash;
 mod light;
+pub mod load;
 mod material;
 mod mesh;
+pub mod path;
 mod pose;
+mod posing;
+mod sample;
 mod scene;
 mod surface;
 
 pub use animation::{Animation, Channel, ChannelTarget, Interpolation};
 pub use camera::{Camera, PosedCamera, Projection};
 pub use light::{Light, LightKind, PosedLight};
+pub use load::{Files, LoadError, NoFiles, load};
 pub use material::{AlphaMode, Filter, Image, Material, NormalTexture, Texture, TextureRef, Wrap};
 pub use mesh::{Mesh, MorphTarget, Part, SkinInfluences};
+pub use path::{CameraPath, CameraSource};
 pub use pose::{DeformedMesh, Pose, PosedInstance};
 pub use scene::{Aabb, Instance, LocalTransform, Node, Scene, SceneHash, Skin, Warning};
 

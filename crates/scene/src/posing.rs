@@ -1,0 +1,251 @@
+//! Poses a scene at one time: transforms, skins, morph targets, lights, cameras.
+
+use std::sync::Arc;
+
+use glam::{Affine3A, Mat3, Mat3A, Quat, Vec3, Vec3A};
+
+use crate::{
+    Aabb, ChannelTarget, DeformedMesh, Instance, LocalTransform, Mesh, Pose, PosedCamera, PosedInstance,
+    PosedLight, Scene,
+};
+
+/// Default ray length as a part of the scene's diagonal.
+const RADIUS_OF_DIAGONAL: f32 = 0.02;
+
+/// What animates one node at one time.
+#[derive(Clone, Default)]
+struct Animated {
+    translation: Option<Vec3>,
+    rotation: Option<Quat>,
+    scale: Option<Vec3>,
+    morph_weights: Option<Vec<f32>>,
+}
+
+impl Scene {
+    /// Everything that moves, at `time_s` seconds. The active animation plays in a loop. A function of the scene
+    /// and the time alone, the same on every machine.
+    pub fn pose(&self, time_s: f64) -> Pose {
+        let animated = self.animate(time_s);
+        let mut world_from_node = self.node_transforms(&animated);
+        for world in &mut world_from_node {
+            // Scales that multiply beyond all bounds: nothing sensible can be drawn, but nothing must break either.
+            if !world.is_finite() {
+                *world = Affine3A::from_scale(Vec3::ZERO);
+            }
+        }
+        let instances = self
+            .instances
+            .iter()
+            .map(|instance| self.pose_instance(instance, &world_from_node, &animated))
+            .collect();
+        let mut lights = Vec::new();
+        let mut cameras = Vec::new();
+        for (node, world) in self.nodes.iter().zip(&world_from_node) {
+            if let Some(light) = node.light {
+                let direction_world =
+                    Vec3::from(world.matrix3 * Vec3A::NEG_Z).try_normalize().unwrap_or(Vec3::NEG_Z);
+                lights.push(PosedLight { light, position_world: world.translation.into(), direction_world });
+            }
+            if let Some(camera) = node.camera {
+                let projection = self.cameras[camera as usize].projection;
+                cameras.push((camera, PosedCamera { world_from_view: without_scale(world), projection }));
+            }
+        }
+        Pose { time: time_s, world_from_node, instances, lights, cameras }
+    }
+
+    /// The vertices of an instance: posed if it deforms, else its mesh's. In the space that the pose's
+    /// `world_from_mesh` of the instance starts from.
+    pub fn vertex_positions<'a>(&'a self, pose: &'a Pose, instance: usize) -> &'a [Vec3] {
+        match &pose.instances[instance].deformed {
+            Some(deformed) => &deformed.positions,
+            None => &self.meshes[self.instances[instance].mesh as usize].positions,
+        }
+    }
+
+    /// The tight world box of one instance. Visits every vertex.
+    pub fn instance_bounds_world(&self, pose: &Pose, instance: usize) -> Aabb {
+        let world_from_mesh = &pose.instances[instance].world_from_mesh;
+        let positions = self.vertex_positions(pose, instance);
+        Aabb::from_points(positions.iter().map(|p| world_from_mesh.transform_point3(*p)))
+    }
+
+    /// The tight world box of all instances. Visits every vertex.
+    pub fn bounds_world(&self, pose: &Pose) -> Aabb {
+        (0..self.instances.len())
+            .fold(Aabb::EMPTY, |bounds, i| bounds.union(self.instance_bounds_world(pose, i)))
+    }
+
+    /// Triangles, each mesh counted as often as it is placed.
+    pub fn triangle_count(&self) -> usize {
+        self.instances.iter().map(|instance| self.meshes[instance.mesh as usize].triangles.len()).sum()
+    }
+
+    /// A sensible length of occlusion rays: 2 % of the diagonal of the world box at time 0.
+    pub fn auto_radius_m(&self) -> f32 {
+        RADIUS_OF_DIAGONAL * self.bounds_world(&self.pose(0.0)).diagonal()
+    }
+
+    /// The active animation's values, one a node; empty without one.
+    fn animate(&self, time_s: f64) -> Vec<Animated> {
+        let Some(animation) = self.active_animation.and_then(|i| self.animations.get(i as usize)) else {
+            return Vec::new();
+        };
+        let duration = f64::from(animation.duration());
+        let time = if time_s.is_finite() { time_s } else { 0.0 };
+        let time = if duration > 0.0 { time.rem_euclid(duration) } else { time };
+        let mut animated = vec![Animated::default(); self.nodes.len()];
+        for channel in animation.channels.iter().filter(|channel| !channel.times.is_empty()) {
+            let node = &mut animated[channel.node as usize];
+            match channel.target {
+                ChannelTarget::Translation => node.translation = Some(channel.vec3(time)),
+                ChannelTarget::Rotation => node.rotation = Some(channel.quat(time)),
+                ChannelTarget::Scale => node.scale = Some(channel.vec3(time)),
+                ChannelTarget::MorphWeights => node.morph_weights = Some(channel.weights(time)),
+            }
+        }
+        animated
+    }
+
+    fn node_transforms(&self, animated: &[Animated]) -> Vec<Affine3A> {
+        let mut world_from_node: Vec<Affine3A> = Vec::with_capacity(self.nodes.len());
+        for (i, node) in self.nodes.iter().enumerate() {
+            let mut local = node.local;
+            if let (LocalTransform::Trs { translation, rotation, scale }, Some(values)) =
+                (&mut local, animated.get(i))
+            {
+                *translation = values.translation.unwrap_or(*translation);
+                *rotation = values.rotation.unwrap_or(*rotation);
+                *scale = values.scale.unwrap_or(*scale);
+            }
+            let parent_from_node = local.parent_from_node();
+            world_from_node.push(match node.parent {
+                Some(parent) => world_from_node[parent as usize] * parent_from_node,
+                None => parent_from_node,
+            });
+        }
+        world_from_node
+    }
+
+    /// Whether every node's place at `time_s` can be computed without overflow; the first that cannot otherwise.
+    pub(crate) fn first_unplaceable_node(&self, time_s: f64) -> Option<usize> {
+        self.node_transforms(&self.animate(time_s)).iter().position(|world| !world.is_finite())
+    }
+
+    fn pose_instance(
+        &self,
+        instance: &Instance,
+        world_from_node: &[Affine3A],
+        animated: &[Animated],
+    ) -> PosedInstance {
+        let mesh = &self.meshes[instance.mesh as usize];
+        let node = &self.nodes[instance.node as usize];
+        let morphed = (!mesh.morph_targets.is_empty()).then(|| {
+            let playing =
+                animated.get(instance.node as usize).and_then(|values| values.morph_weights.as_deref());
+            let still = if node.morph_weights.is_empty() { &mesh.morph_weights } else { &node.morph_weights };
+            morph(mesh, playing.unwrap_or(still))
+        });
+        match instance.skin {
+            Some(skin) if !mesh.influences.is_empty() => {
+                let skin = &self.skins[skin as usize];
+                let joints = skin.joints.iter().zip(&skin.inverse_bind_matrices);
+                let world_from_bind: Vec<Affine3A> =
+                    joints.map(|(&joint, bind)| world_from_node[joint as usize] * *bind).collect();
+                let deformed = match &morphed {
+                    Some(morphed) => {
+                        skin_vertices(mesh, &morphed.positions, &morphed.normals, &world_from_bind)
+                    }
+                    None => skin_vertices(mesh, &mesh.positions, &mesh.normals, &world_from_bind),
+                };
+                PosedInstance { world_from_mesh: Affine3A::IDENTITY, deformed: Some(Arc::new(deformed)) }
+            }
+            _ => PosedInstance {
+                world_from_mesh: world_from_node[instance.node as usize],
+                deformed: morphed.map(Arc::new),
+            },
+        }
+    }
+}
+
+/// Rotation and place of a transform, for cameras: the view axis is kept, up as near as possible.
+fn without_scale(world: &Affine3A) -> Affine3A {
+    let z = world.matrix3.z_axis.try_normalize().unwrap_or(Vec3A::Z);
+    let x = world.matrix3.y_axis.cross(z).try_normalize();
+    let x = x.unwrap_or_else(|| Vec3A::from(Vec3::from(z).any_orthonormal_vector()));
+    Affine3A { matrix3: Mat3A::from_cols(x, z.cross(x), z), translation: world.translation }
+}
+
+/// Base plus weighted displacements (glTF 2.0, 3.7.2.2).
+fn morph(mesh: &Mesh, weights: &[f32]) -> DeformedMesh {
+    let mut positions = mesh.positions.clone();
+    let mut normals = mesh.normals.clone();
+    for (target, &weight) in mesh.morph_targets.iter().zip(weights) {
+        if weight == 0.0 {
+            continue;
+        }
+        for (position, offset) in positions.iter_mut().zip(&target.positions) {
+            *position += weight * *offset;
+        }
+        for (normal, offset) in normals.iter_mut().zip(&target.normals) {
+            *normal += weight * *offset;
+        }
+    }
+    clean(&mut positions, &mut normals, &mesh.normals);
+    DeformedMesh { positions, normals }
+}
+
+/// Linear blend skinning into the world (glTF 2.0, 3.7.3).
+fn skin_vertices(
+    mesh: &Mesh,
+    positions: &[Vec3],
+    normals: &[Vec3],
+    world_from_bind: &[Affine3A],
+) -> DeformedMesh {
+    let mut posed = DeformedMesh {
+        positions: Vec::with_capacity(positions.len()),
+        normals: Vec::with_capacity(positions.len()),
+    };
+    for v in 0..positions.len() {
+        let mut linear = Mat3A::ZERO;
+        let mut translation = Vec3A::ZERO;
+        for set in &mesh.influences {
+            for (joint, weight) in set.joints[v].into_iter().zip(set.weights[v]) {
+                if weight != 0.0
+                    && let Some(world) = world_from_bind.get(usize::from(joint))
+                {
+                    linear += world.matrix3 * weight;
+                    translation += world.translation * weight;
+                }
+            }
+        }
+        posed.positions.push(Vec3::from(linear * Vec3A::from(positions[v]) + translation));
+        posed.normals.push(transform_normal(&Mat3::from(linear), normals[v]));
+    }
+    clean(&mut posed.positions, &mut posed.normals, normals);
+    posed
+}
+
+/// A normal under a linear map: inverse transpose up to a positive factor, which also serves singular maps.
+fn transform_normal(linear: &Mat3, normal: Vec3) -> Vec3 {
+    let (x, y, z) = (linear.x_axis, linear.y_axis, linear.z_axis);
+    let cofactors = Mat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
+    let mirrored = x.dot(cofactors.x_axis) < 0.0;
+    let moved = cofactors * normal;
+    if mirrored { -moved } else { moved }
+}
+
+/// Unit normals and finite positions, whatever the weights and joints were.
+fn clean(positions: &mut [Vec3], normals: &mut [Vec3], fallback: &[Vec3]) {
+    for position in positions {
+        if !position.is_finite() {
+            *position = Vec3::ZERO;
+        }
+    }
+    for (normal, fallback) in normals.iter_mut().zip(fallback) {
+        *normal = normal.try_normalize().filter(|n| n.is_finite()).unwrap_or(*fallback);
+    }
+}
+
+#[cfg(test)]
+mod tests;
