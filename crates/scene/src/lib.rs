@@ -6,6 +6,8 @@
 //! A [`Scene`] is plain data. [`Scene::pose`] gives everything that moves at one time as a [`Pose`].
 
 mod animation;
+#[cfg(feature = "builtin")]
+pub mod builtin;
 mod camera;
 mod hash;
 mod light;

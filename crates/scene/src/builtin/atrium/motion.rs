@@ -1,0 +1,217 @@
+//! What moves in the atrium: boulders, spot lights, and the two cameras.
+
+use glam::{Mat3, Quat, Vec3};
+
+use super::plan::*;
+use crate::builtin::noise::unit;
+use crate::builtin::physics::{Body, Push};
+use crate::builtin::shapes::boulder_points;
+
+/// Length of the animation, seconds.
+pub(super) const SECONDS: f32 = 15.0;
+/// Frames of a camera path.
+pub(super) const FRAMES: u32 = 900;
+/// Different rocks; boulder `i` is rock `i % ROCKS`.
+pub(super) const ROCKS: u32 = 3;
+
+/// A boulder's start: radius, position of its underside, and when it is pushed how.
+struct Start {
+    radius: f32,
+    under: Vec3,
+    push: (f32, Vec3),
+}
+
+const fn start(radius: f32, x: f32, y: f32, z: f32, time: f32, vx: f32, vz: f32) -> Start {
+    Start { radius, under: Vec3::new(x, y, z), push: (time, Vec3::new(vx, 0.0, vz)) }
+}
+
+const BOULDERS: &[Start] = &[
+    // Down the west flight, one after another.
+    start(0.42, -8.4, GALLERY, -2.55, 0.2, 2.6, 0.0),
+    start(0.30, -9.3, GALLERY, -2.0, 3.4, 3.0, -0.35),
+    start(0.50, -9.0, GALLERY, -3.4, 7.6, 2.8, 0.55),
+    // Down the east flight.
+    start(0.55, 8.5, GALLERY, 2.55, 1.6, -2.6, 0.0),
+    start(0.27, 9.4, GALLERY, 2.9, 5.6, -3.0, -0.1),
+    start(0.38, 9.2, GALLERY, 1.6, 9.6, -2.8, 0.5),
+    // Through the skylight.
+    start(0.60, 3.3, 6.6, -1.3, 0.0, -0.5, 0.3),
+    start(0.33, -4.2, 4.6, 1.9, 0.0, 1.0, 0.3),
+    // Across the hall and along the north aisle.
+    start(0.36, -6.6, 0.0, 1.0, 5.0, 3.6, 0.35),
+    start(0.45, 9.4, 0.0, -5.1, 2.2, -3.4, 0.0),
+    start(0.25, 6.4, 0.0, -0.9, 8.2, -3.2, -0.5),
+];
+
+/// The boulders: bodies for the simulation, in the order of their nodes.
+pub(super) fn boulders() -> Vec<Body> {
+    BOULDERS
+        .iter()
+        .enumerate()
+        .map(|(i, start)| {
+            let seed = i as u32;
+            let axis = Vec3::new(unit(61, seed) - 0.5, unit(62, seed) - 0.5, unit(63, seed) - 0.5);
+            let rotation = Quat::from_axis_angle(axis.normalize_or(Vec3::Y), 6.0 * unit(64, seed));
+            let points = boulder_points(2, rock_seed(seed % ROCKS));
+            let lowest = points.iter().fold(0.0_f32, |y, &p| y.min((rotation * p).y));
+            Body {
+                hull: points.iter().map(|&p| p * start.radius).collect(),
+                radius: start.radius,
+                position: start.under - Vec3::Y * (lowest * start.radius - 0.002),
+                rotation,
+                pushes: vec![Push { time: start.push.0, velocity: start.push.1 }],
+            }
+        })
+        .collect()
+}
+
+/// The seed of a rock's shape.
+pub(super) fn rock_seed(rock: u32) -> u32 {
+    900 + rock
+}
+
+/// The walk at eye height: control points of the eye and of what it looks at.
+pub(super) fn walk() -> (Vec<Vec3>, Vec<Vec3>) {
+    let eye = |x: f32, z: f32| Vec3::new(x, 1.65, z);
+    let path = vec![
+        eye(-9.4, 5.15),
+        eye(-7.4, 5.2),
+        eye(-5.2, 5.1),
+        eye(-3.9, 4.7),
+        eye(-3.9, 3.7),
+        eye(-3.5, 2.6),
+        eye(-2.6, 1.4),
+        eye(-2.2, 0.0),
+        eye(-1.6, -1.1),
+        eye(-0.2, -1.6),
+        eye(1.4, -1.7),
+        eye(3.0, -1.5),
+        eye(4.4, -0.9),
+        eye(5.8, -0.2),
+        eye(7.8, 0.0),
+        eye(8.9, 0.2),
+    ];
+    let look = vec![
+        Vec3::new(0.0, 1.7, 4.9),
+        Vec3::new(0.0, 1.7, 4.4),
+        Vec3::new(0.5, 1.9, 2.5),
+        Vec3::new(0.5, 2.0, 0.0),
+        Vec3::new(0.5, 1.9, -2.0),
+        Vec3::new(-1.5, 2.0, -4.5),
+        Vec3::new(-2.5, 2.3, -5.0),
+        Vec3::new(1.5, 2.4, -4.5),
+        Vec3::new(6.0, 2.6, -3.0),
+        Vec3::new(8.0, 3.0, 1.5),
+        Vec3::new(9.0, 2.6, 3.0),
+        Vec3::new(11.0, 1.5, 3.4),
+    ];
+    (path, look)
+}
+
+/// The flight along the gallery: control points of the eye and of what it looks at.
+pub(super) fn flight() -> (Vec<Vec3>, Vec<Vec3>) {
+    let p = Vec3::new;
+    let path = vec![
+        p(-9.3, 6.0, 5.3),
+        p(-7.0, 6.05, 5.35),
+        p(-4.5, 6.1, 5.3),
+        p(-2.0, 6.1, 5.3),
+        p(0.4, 6.15, 5.25),
+        p(2.6, 6.15, 5.2),
+        p(3.7, 6.2, 4.6),
+        p(3.95, 6.25, 3.4),
+        p(3.6, 6.3, 1.8),
+        p(2.0, 6.3, 0.4),
+        p(-0.6, 6.2, -0.4),
+        p(-3.6, 6.15, -0.7),
+        p(-6.2, 6.0, -2.2),
+        p(-7.8, 5.95, -2.6),
+        p(-9.0, 5.9, -2.7),
+        p(-9.6, 5.9, -1.4),
+    ];
+    let look = vec![
+        p(-1.0, 5.2, 3.0),
+        p(0.0, 4.2, 0.5),
+        p(1.0, 2.5, -0.5),
+        p(2.0, 2.0, -1.0),
+        p(3.5, 2.2, -1.5),
+        p(3.0, 2.2, -2.5),
+        p(0.5, 1.8, -2.0),
+        p(-3.0, 2.2, -0.8),
+        p(-6.0, 3.2, 0.2),
+        p(-7.5, 3.6, -0.6),
+        p(-6.5, 3.9, 0.6),
+        p(-3.0, 3.0, 1.6),
+        p(2.0, 2.6, 1.6),
+    ];
+    (path, look)
+}
+
+/// A spot light that sweeps: where it hangs, what it points at on average, how far and how fast it sweeps, its colour.
+pub(super) struct Spot {
+    pub(super) at: Vec3,
+    pub(super) aim: Vec3,
+    pub(super) sweep: Vec3,
+    pub(super) turns: [f32; 2],
+    pub(super) color: Vec3,
+    pub(super) candela: f32,
+}
+
+/// The moving spot lights: they hang under the beams of the roof and along the gallery.
+pub(super) fn spots() -> Vec<Spot> {
+    let p = Vec3::new;
+    vec![
+        Spot {
+            at: p(-6.9, 7.9, 3.1),
+            aim: p(-1.5, 0.0, -0.4),
+            sweep: p(3.6, 0.0, 1.6),
+            turns: [1.0, 2.0],
+            color: p(1.0, 0.82, 0.6),
+            candela: 75.0,
+        },
+        Spot {
+            at: p(6.9, 7.9, -3.1),
+            aim: p(1.5, 0.0, 0.4),
+            sweep: p(3.6, 0.0, 1.8),
+            turns: [2.0, 1.0],
+            color: p(0.65, 0.8, 1.0),
+            candela: 70.0,
+        },
+        Spot {
+            at: p(6.9, 7.9, 3.1),
+            aim: p(-3.0, 2.2, -3.4),
+            sweep: p(3.0, 1.6, 0.6),
+            turns: [1.0, 1.0],
+            color: p(1.0, 0.55, 0.45),
+            candela: 80.0,
+        },
+        Spot {
+            at: p(-6.9, 7.9, -3.1),
+            aim: p(3.0, 2.2, 3.4),
+            sweep: p(3.4, 1.4, 0.6),
+            turns: [1.0, 2.0],
+            color: p(0.75, 1.0, 0.7),
+            candela: 60.0,
+        },
+    ]
+}
+
+impl Spot {
+    /// The rotation that points the light's −Z where it shines at a time (seconds). It repeats after [`SECONDS`].
+    pub(super) fn rotation(&self, time: f32) -> Quat {
+        let phase = std::f32::consts::TAU * time / SECONDS;
+        let swing = Vec3::new(
+            libm::sinf(phase * self.turns[0]),
+            libm::sinf(phase * self.turns[1] + 1.3),
+            libm::cosf(phase * self.turns[1]),
+        );
+        look_along(self.aim + self.sweep * swing - self.at)
+    }
+}
+
+/// A rotation that brings −Z to a direction, Y as upright as possible.
+pub(super) fn look_along(direction: Vec3) -> Quat {
+    let back = -direction.normalize_or(Vec3::NEG_Z);
+    let right = Vec3::Y.cross(back).normalize_or(Vec3::X);
+    Quat::from_mat3(&Mat3::from_cols(right, back.cross(right), back)).normalize()
+}

@@ -1,0 +1,88 @@
+//! Procedural textures of the atrium: RGBA texels from integer noise, a whole number of features a metre.
+
+use glam::Vec3;
+
+use crate::builtin::noise::{fractal_noise, hash};
+
+/// Texels a side of every texture.
+pub(super) const SIZE: u32 = 256;
+
+fn paint(texel: impl Fn(u32, u32) -> [f32; 4]) -> Vec<u8> {
+    let mut rgba = Vec::with_capacity((4 * SIZE * SIZE) as usize);
+    for y in 0..SIZE {
+        for x in 0..SIZE {
+            rgba.extend(texel(x, y).map(|c| libm::roundf(255.0 * c.clamp(0.0, 1.0)) as u8));
+        }
+    }
+    rgba
+}
+
+/// Noise that repeats over the texture: two shifted copies, blended across the seam.
+fn tiling(seed: u32, x: u32, y: u32, stretch: [f32; 2], octaves: u32) -> f32 {
+    let (u, v) = (x as f32 / SIZE as f32, y as f32 / SIZE as f32);
+    let at = |u: f32, v: f32| fractal_noise(seed, Vec3::new(u * stretch[0], v * stretch[1], 3.5), octaves);
+    let top = at(u, v) * (1.0 - u) + at(u - 1.0, v) * u;
+    let bottom = at(u, v - 1.0) * (1.0 - u) + at(u - 1.0, v - 1.0) * u;
+    top * (1.0 - v) + bottom * v
+}
+
+/// Floor tiles, two by two a metre, alternately light and dark, each of its own shade, with grout.
+pub(super) fn floor() -> Vec<u8> {
+    let tile = SIZE / 2;
+    paint(|x, y| {
+        let (i, j) = (x / tile, y / tile);
+        let (px, py) = (x % tile, y % tile);
+        let edge = px.min(tile - 1 - px).min(py.min(tile - 1 - py));
+        if edge < 2 {
+            return [0.36, 0.33, 0.30, 1.0];
+        }
+        let vein = tiling(10 + i * 2 + j, x, y, [7.0, 7.0], 4);
+        let base = if (i + j) % 2 == 0 { [0.80, 0.74, 0.65] } else { [0.60, 0.46, 0.37] };
+        let shade = 1.0 + 0.16 * vein + (i as f32 - 0.5) * 0.05 - if edge < 4 { 0.08 } else { 0.0 };
+        [base[0] * shade, base[1] * shade, base[2] * shade, 1.0]
+    })
+}
+
+/// Ashlar: courses of a quarter of a metre, blocks of half a metre, every second course shifted.
+pub(super) fn stone() -> Vec<u8> {
+    let (course, block) = (SIZE / 4, SIZE / 2);
+    paint(|x, y| {
+        let row = y / course;
+        let shifted = (x + (row % 2) * block / 2) % SIZE;
+        let (px, py) = (shifted % block, y % course);
+        let edge = px.min(block - 1 - px).min(py.min(course - 1 - py));
+        let own = (hash(5, (shifted / block) as i32, row as i32, 0) >> 16) as f32 / 65536.0 - 0.5;
+        let grain = tiling(21, x, y, [9.0, 9.0], 4);
+        let joint = if edge < 1 { 0.84 } else { 1.0 };
+        let shade = (0.93 + 0.06 * own + 0.07 * grain) * joint;
+        [0.86 * shade, 0.78 * shade, 0.66 * shade, 1.0]
+    })
+}
+
+/// Dark wood: boards a quarter of a metre wide along v, with grain.
+pub(super) fn wood() -> Vec<u8> {
+    let board = SIZE / 4;
+    paint(|x, y| {
+        let own = (hash(9, (x / board) as i32, 0, 0) >> 16) as f32 / 65536.0 - 0.5;
+        let gap = if x % board < 2 { 0.45 } else { 1.0 };
+        let grain = tiling(31, x, y, [26.0, 2.5], 4);
+        let shade = (1.0 + 0.2 * own + 0.35 * grain) * gap;
+        [0.40 * shade, 0.25 * shade, 0.15 * shade, 1.0]
+    })
+}
+
+/// A lattice of crossed bars with eight-pointed openings, four a metre; alpha 0 in the openings.
+pub(super) fn lattice() -> Vec<u8> {
+    let cell = SIZE as f32 / 4.0;
+    paint(|x, y| {
+        let local = |v: u32| ((v as f32 + 0.5) % cell) / cell - 0.5;
+        let (u, v) = (local(x), local(y));
+        let (a, b) = (u.abs(), v.abs());
+        // Union of a square and the same square turned by 45°: a star.
+        let star = (a.max(b) < 0.30) || (a + b < 0.425);
+        let small = (0.5 - a) + (0.5 - b) < 0.13;
+        let grain = 1.0 + 0.2 * tiling(41, x, y, [4.0, 20.0], 3);
+        let alpha = if star || small { 0.0 } else { 1.0 };
+        [0.36 * grain, 0.22 * grain, 0.13 * grain, alpha]
+    })
+}

@@ -1,0 +1,64 @@
+//! Smooth camera paths: a curve for the eye at constant speed, another for what it looks at.
+
+use glam::{Quat, Vec3};
+
+use crate::PosedCamera;
+
+/// A point of the uniform cubic B-spline with the given control points, whose ends it meets; `t` in 0 … 1.
+/// It has continuous acceleration and stays within the hull of four neighbouring control points.
+pub fn spline(control: &[Vec3], t: f32) -> Vec3 {
+    let last = control.len().saturating_sub(1) as i64;
+    // Tripled ends: one more span at either end, and the curve starts and ends at the outer control points.
+    let spans = (last + 2) as f32;
+    let s = (t.clamp(0.0, 1.0) * spans).min(spans - 1e-4);
+    let i = s.floor();
+    let f = s - i;
+    let at = |k: i64| control.get((i as i64 + k - 2).clamp(0, last) as usize).copied().unwrap_or(Vec3::ZERO);
+    let (f2, f3) = (f * f, f * f * f);
+    let weights = [
+        (1.0 - 3.0 * f + 3.0 * f2 - f3) / 6.0,
+        (4.0 - 6.0 * f2 + 3.0 * f3) / 6.0,
+        (1.0 + 3.0 * f + 3.0 * f2 - 3.0 * f3) / 6.0,
+        f3 / 6.0,
+    ];
+    at(0) * weights[0] + at(1) * weights[1] + at(2) * weights[2] + at(3) * weights[3]
+}
+
+/// `frames + 1` points along [`spline`] at equal distances on the curve.
+pub fn even_spline(control: &[Vec3], frames: u32) -> Vec<Vec3> {
+    let fine = 16 * frames.max(64);
+    let points: Vec<Vec3> = (0..=fine).map(|i| spline(control, i as f32 / fine as f32)).collect();
+    let mut way = vec![0.0_f64];
+    for pair in points.windows(2) {
+        way.push(way[way.len() - 1] + f64::from(pair[0].distance(pair[1])));
+    }
+    let total = way[way.len() - 1];
+    let mut segment = 0;
+    (0..=frames)
+        .map(|i| {
+            let goal = total * f64::from(i) / f64::from(frames.max(1));
+            while segment + 2 < way.len() && way[segment + 1] < goal {
+                segment += 1;
+            }
+            let step = (way[segment + 1] - way[segment]).max(1e-12);
+            points[segment].lerp(points[segment + 1], (((goal - way[segment]) / step) as f32).clamp(0.0, 1.0))
+        })
+        .collect()
+}
+
+/// Poses of a camera that moves along `eye` at constant speed and looks at a point that moves along `target` evenly in time:
+/// `frames + 1` positions and rotations (neighbours in one hemisphere), upright.
+pub fn fly(eye: &[Vec3], target: &[Vec3], frames: u32) -> (Vec<Vec3>, Vec<Quat>) {
+    let positions = even_spline(eye, frames);
+    let mut rotations: Vec<Quat> = Vec::with_capacity(positions.len());
+    for (i, &position) in positions.iter().enumerate() {
+        let look = spline(target, i as f32 / frames.max(1) as f32);
+        let camera = PosedCamera::look_at(position, look, 1.0);
+        let mut rotation = Quat::from_mat3a(&camera.world_from_view.matrix3).normalize();
+        if rotations.last().is_some_and(|last| last.dot(rotation) < 0.0) {
+            rotation = -rotation;
+        }
+        rotations.push(rotation);
+    }
+    (positions, rotations)
+}
