@@ -136,3 +136,20 @@ impl Random {
         }
     }
 }
+
+/// Triangles of all sizes, some without area, some doubled.
+pub(crate) fn soup(random: &mut Random, triangles: usize, size: f32) -> Mesh {
+    let (mut positions, mut indices) = (Vec::new(), Vec::new());
+    for i in 0..triangles {
+        let base = positions.len() as u32;
+        let center = random.vector();
+        let s = size * (0.05 + random.next());
+        positions.extend([0, 1, 2].map(|_| center + s * random.vector()));
+        indices.push(match i % 17 {
+            5 => [base, base, base + 1],
+            11 => [0, 1, 2],
+            _ => [base, base + 1, base + 2],
+        });
+    }
+    mesh(positions, indices)
+}

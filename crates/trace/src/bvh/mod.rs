@@ -19,6 +19,8 @@ mod tree;
 mod triangle;
 
 #[cfg(test)]
+mod brute_force;
+#[cfg(test)]
 mod tests;
 #[cfg(test)]
 mod timing;

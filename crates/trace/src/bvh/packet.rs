@@ -4,11 +4,12 @@
 //! around all rays culls most children when rays are short. Where few rays are left they go on alone.
 //! Every ray gets the answer that [`MeshBvh::any_hit`] gives it.
 
+use dapple_scene::Aabb;
 use dapple_scene::glam::Vec3;
 
 use super::alpha::AlphaMaterials;
 use super::mesh::MeshBvh;
-use super::tree::{CONSERVATIVE, Child, Node};
+use super::tree::{CONSERVATIVE, Child, Tree};
 use super::triangle::{
     MeshRay, Plane, Triangle, axes_around, finite_inverse, intersect, main_axis, max, min,
 };
@@ -19,7 +20,7 @@ pub(crate) const PACKET: usize = 64;
 const LANES: usize = 8;
 const CHUNKS: usize = PACKET / LANES;
 /// This few rays go on alone.
-const SINGLE: u32 = 6;
+pub(crate) const SINGLE: u32 = 6;
 
 type Lanes = [[f32; LANES]; CHUNKS];
 
@@ -134,7 +135,7 @@ impl Packet {
             while slots != 0 {
                 let slot = slots.trailing_zeros() as usize;
                 slots &= slots - 1;
-                let rays = self.rays_through(node, slot, rays & open);
+                let rays = self.rays_through(&node.child_bounds(slot), rays & open);
                 if rays == 0 {
                     continue;
                 }
@@ -151,13 +152,59 @@ impl Packet {
             }
         }
         self.stack = stack;
-        let mut blocked = 0;
-        let mut lanes = all & !open;
+        self.sources(all & !open)
+    }
+
+    /// Bits by the caller's index from bits by lane.
+    pub(crate) fn sources(&self, mut lanes: u64) -> u64 {
+        let mut sources = 0;
         while lanes != 0 {
-            blocked |= 1 << self.source[lanes.trailing_zeros() as usize];
+            sources |= 1 << self.source[lanes.trailing_zeros() as usize];
             lanes &= lanes - 1;
         }
-        blocked
+        sources
+    }
+
+    /// The directions by lane.
+    pub(crate) fn directions(&self) -> &[[f32; 3]; PACKET] {
+        &self.directions
+    }
+
+    /// Calls `found` with the primitives of `tree` whose box some rays may touch, and those rays (bits by lane).
+    pub(crate) fn primitives_through(
+        &self,
+        tree: &Tree,
+        bounds_of: impl Fn(u32) -> Aabb,
+        mut found: impl FnMut(u32, u64),
+    ) {
+        let mut stack = Vec::with_capacity(32);
+        if !tree.nodes.is_empty() {
+            stack.push((0, self.along[0] | self.along[1] | self.along[2]));
+        }
+        while let Some((index, rays)) = stack.pop() {
+            let node = &tree.nodes[index as usize];
+            let mut slots = node.touching(self.min, self.max);
+            while slots != 0 {
+                let slot = slots.trailing_zeros() as usize;
+                slots &= slots - 1;
+                let rays = self.rays_through(&node.child_bounds(slot), rays);
+                if rays == 0 {
+                    continue;
+                }
+                match node.child(slot) {
+                    Child::Inner(child) => stack.push((child, rays)),
+                    Child::Leaf(range) => {
+                        for &primitive in &tree.order[range] {
+                            let rays = self.rays_through(&bounds_of(primitive), rays);
+                            if rays != 0 {
+                                found(primitive, rays);
+                            }
+                        }
+                    }
+                    Child::Empty => {}
+                }
+            }
+        }
     }
 
     fn ray(&self, lane: usize) -> MeshRay {
@@ -185,13 +232,12 @@ impl Packet {
         blocked
     }
 
-    /// Those of `rays` that may touch a child's box.
+    /// Those of `rays` that may touch a box. The answer for the empty box is of no meaning.
     #[inline(always)]
-    fn rays_through(&self, node: &Node, slot: usize, rays: u64) -> u64 {
+    fn rays_through(&self, bounds: &Aabb, rays: u64) -> u64 {
         let [ox, oy, oz] = self.origin;
-        let b = &node.bounds;
-        let (x0, y0, z0) = (b[0][slot] - ox, b[1][slot] - oy, b[2][slot] - oz);
-        let (x1, y1, z1) = (b[3][slot] - ox, b[4][slot] - oy, b[5][slot] - oz);
+        let (x0, y0, z0) = (bounds.min.x - ox, bounds.min.y - oy, bounds.min.z - oz);
+        let (x1, y1, z1) = (bounds.max.x - ox, bounds.max.y - oy, bounds.max.z - oz);
         let t_max = self.t_max;
         let mut through = 0;
         for chunk in 0..CHUNKS {
@@ -284,7 +330,7 @@ impl Packet {
             let w = bx * ay - by * ax;
             let miss = ((u < 0.0) | (v < 0.0) | (w < 0.0)) & ((u > 0.0) | (v > 0.0) | (w > 0.0));
             let det = u + v + w;
-            let exact = (u == 0.0) | (v == 0.0) | (w == 0.0) | !(det.abs() < f32::INFINITY);
+            let exact = (u == 0.0) | (v == 0.0) | (w == 0.0) | !det.is_finite();
             inside |= u32::from(!miss & !exact) << i;
             ask |= u32::from(!miss & exact) << i;
         }

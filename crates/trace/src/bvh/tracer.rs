@@ -9,10 +9,13 @@ use rayon::prelude::*;
 use super::alpha::{AlphaMaterials, MeshAlpha};
 use super::build::build;
 use super::mesh::{MeshBvh, NearFar};
-use super::packet::{PACKET, Packet, reach};
+use super::packet::{PACKET, Packet, SINGLE, reach};
 use super::tree::{Child, Tree, WIDTH};
 use super::triangle::MeshRay;
 use super::{BlockedMask, Hit, MAX_DIRECTIONS, Ray};
+
+/// Up to so many instances nearby are all asked about all rays.
+const FEW_INSTANCES: usize = 4;
 
 /// World boxes grow by this part of the numbers they were computed from: more than the rounding of the transform.
 const BOX_MARGIN: f32 = 1.0 / (1 << 20) as f32;
@@ -198,39 +201,111 @@ impl Tracer {
     pub fn occlusion(&self, origin_world: Vec3, directions_world: &[Vec3], t_max: f32) -> BlockedMask {
         let directions_world = &directions_world[..directions_world.len().min(MAX_DIRECTIONS)];
         let mut blocked = BlockedMask::default();
-        if !origin_world.is_finite() || !(t_max > 0.0) {
+        if !origin_world.is_finite() || t_max.is_nan() || t_max <= 0.0 {
             return blocked;
         }
-        let near = self.instances_near(origin_world, directions_world, t_max);
-        if near.is_empty() {
+        let near = self.few_instances_near(origin_world, directions_world, t_max);
+        if near.as_ref().is_some_and(Vec::is_empty) {
             return blocked;
         }
-        let mut packet = Packet::new();
-        let mut directions_mesh = [Vec3::ZERO; PACKET];
+        let mut packets = (Packet::new(), Packet::new());
         for (word, directions) in blocked.iter_mut().zip(directions_world.chunks(PACKET)) {
-            let all = u64::MAX >> (PACKET - directions.len());
-            for &(_, placed) in &near {
-                let open = all & !*word;
-                if open == 0 {
-                    break;
-                }
-                let placement = &placed.placement;
-                for (mesh, world) in directions_mesh.iter_mut().zip(directions) {
-                    *mesh = placement.direction(*world);
-                }
-                let origin = placement.position(origin_world);
-                packet.fill(origin, &directions_mesh[..directions.len()], open, t_max);
-                *word |= packet.trace(&placed.bvh, &self.alpha);
-            }
+            *word = match &near {
+                Some(near) => self.blocked_by_few(origin_world, directions, t_max, near, &mut packets.0),
+                None => self.blocked_by_many(origin_world, directions, t_max, &mut packets),
+            };
         }
         blocked
     }
 
-    /// Instances whose box the rays may touch, nearest first.
-    fn instances_near(&self, origin: Vec3, directions: &[Vec3], t_max: f32) -> Vec<(f32, &PlacedBvh)> {
+    /// Sends all rays through each instance.
+    fn blocked_by_few(
+        &self,
+        origin_world: Vec3,
+        directions_world: &[Vec3],
+        t_max: f32,
+        near: &[(f32, &PlacedBvh)],
+        packet: &mut Packet,
+    ) -> u64 {
+        let all = u64::MAX >> (PACKET - directions_world.len());
+        let mut blocked = 0;
+        let mut directions_mesh = [Vec3::ZERO; PACKET];
+        for (_, placed) in near {
+            let open = all & !blocked;
+            if open == 0 {
+                break;
+            }
+            for (mesh, world) in directions_mesh.iter_mut().zip(directions_world) {
+                *mesh = placed.placement.direction(*world);
+            }
+            let origin = placed.placement.position(origin_world);
+            packet.fill(origin, &directions_mesh[..directions_world.len()], open, t_max);
+            blocked |= packet.trace(&placed.bvh, &self.alpha);
+        }
+        blocked
+    }
+
+    /// Finds out first which rays may touch which instance's box.
+    fn blocked_by_many(
+        &self,
+        origin_world: Vec3,
+        directions_world: &[Vec3],
+        t_max: f32,
+        (world, mesh): &mut (Packet, Packet),
+    ) -> u64 {
+        let all = u64::MAX >> (PACKET - directions_world.len());
+        world.fill(origin_world, directions_world, all, t_max);
+        let bounds_of = |i: u32| self.instances[i as usize].as_ref().map_or(Aabb::EMPTY, |p| p.bounds_world);
+        let mut met: Vec<(f32, &PlacedBvh, u64)> = Vec::new();
+        world.primitives_through(&self.top, bounds_of, |instance, rays| {
+            if let Some(placed) = &self.instances[instance as usize] {
+                met.push((placed.bounds_world.distance_squared(origin_world), placed, rays));
+            }
+        });
+        met.sort_by(|a, b| a.0.total_cmp(&b.0));
+
+        // From here on rays go by their lane in the world's packet.
+        let mut blocked = 0;
+        let mut directions_mesh = [Vec3::ZERO; PACKET];
+        for (_, placed, rays) in met {
+            let mut rays = rays & !blocked;
+            if rays == 0 {
+                continue;
+            }
+            let placement = &placed.placement;
+            let origin = placement.position(origin_world);
+            let direction = |lane: usize| placement.direction(Vec3::from_array(world.directions()[lane]));
+            if rays.count_ones() > SINGLE {
+                for (lane, mesh) in directions_mesh.iter_mut().enumerate() {
+                    *mesh = direction(lane);
+                }
+                mesh.fill(origin, &directions_mesh, rays, t_max);
+                blocked |= mesh.trace(&placed.bvh, &self.alpha);
+                continue;
+            }
+            while rays != 0 {
+                let lane = rays.trailing_zeros() as usize;
+                rays &= rays - 1;
+                let ray = MeshRay::new(origin, direction(lane), t_max);
+                if ray.is_some_and(|r| placed.bvh.any_hit(0, &r, &self.alpha)) {
+                    blocked |= 1 << lane;
+                }
+            }
+        }
+        world.sources(blocked)
+    }
+
+    /// Instances whose box the rays may touch, nearest first; `None` if they are more than [`FEW_INSTANCES`].
+    fn few_instances_near(
+        &self,
+        origin: Vec3,
+        directions: &[Vec3],
+        t_max: f32,
+    ) -> Option<Vec<(f32, &PlacedBvh)>> {
         let (lo, hi) = reach(directions.iter().copied(), t_max);
         let (min, max) = (origin + lo, origin + hi);
-        let mut near = Vec::new();
+        let reach_squared = t_max * t_max * 1.000_01;
+        let mut near = Vec::with_capacity(FEW_INSTANCES);
         let mut stack = Vec::with_capacity(16);
         if !self.top.nodes.is_empty() {
             stack.push(0);
@@ -246,17 +321,22 @@ impl Tracer {
                     Child::Leaf(range) => {
                         let indices = self.top.order[range].iter();
                         for placed in indices.filter_map(|&i| self.instances[i as usize].as_ref()) {
-                            near.push((placed.bounds_world.distance_squared(origin), placed));
+                            let distance_squared = placed.bounds_world.distance_squared(origin);
+                            if distance_squared > reach_squared {
+                                continue;
+                            }
+                            if near.len() == FEW_INSTANCES {
+                                return None;
+                            }
+                            near.push((distance_squared, placed));
                         }
                     }
                     Child::Empty => {}
                 }
             }
         }
-        let reach_squared = t_max * t_max * 1.000_01;
-        near.retain(|(distance_squared, _)| *distance_squared <= reach_squared);
         near.sort_by(|a, b| a.0.total_cmp(&b.0));
-        near
+        Some(near)
     }
 
     /// Whether anything blocks the ray.

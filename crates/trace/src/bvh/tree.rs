@@ -87,15 +87,15 @@ impl Node {
     /// The children (bit i for slot i) that share a point with the box `min` … `max`.
     #[inline(always)]
     pub(crate) fn touching(&self, min: Vec3, max: Vec3) -> u32 {
-        let b = &self.bounds;
+        let [x0, y0, z0, x1, y1, z1] = &self.bounds;
         let mut mask = 0;
         for i in 0..WIDTH {
-            let apart = (b[0][i] > max.x)
-                | (b[1][i] > max.y)
-                | (b[2][i] > max.z)
-                | (b[3][i] < min.x)
-                | (b[4][i] < min.y)
-                | (b[5][i] < min.z);
+            let apart = (x0[i] > max.x)
+                | (y0[i] > max.y)
+                | (z0[i] > max.z)
+                | (x1[i] < min.x)
+                | (y1[i] < min.y)
+                | (z1[i] < min.z);
             mask |= u32::from(!apart) << i;
         }
         mask
@@ -134,7 +134,7 @@ impl Tree {
     /// Expected cost of a long random ray, in box and triangle tests (surface area heuristic). Finite, ≥ 0.
     pub(crate) fn cost(&self) -> f64 {
         let root = half_area(&self.bounds());
-        if !(root > 0.0) {
+        if root == 0.0 {
             return 0.0;
         }
         let mut sum = 0.0;

@@ -109,7 +109,7 @@ pub(crate) fn intersect(ray: &MeshRay, triangle: &Triangle) -> Option<TriangleHi
         return None;
     }
     let det = u + v + w;
-    let weights = if (u == 0.0) | (v == 0.0) | (w == 0.0) | !(det.abs() < f32::INFINITY) {
+    let weights = if (u == 0.0) | (v == 0.0) | (w == 0.0) | !det.is_finite() {
         exact_weights([ax, ay], [bx, by], [cx, cy])?
     } else {
         [u / det, v / det, w / det]
