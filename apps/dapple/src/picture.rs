@@ -1,9 +1,15 @@
-//! Writing files so that an interrupted run never leaves half of one.
+//! Pictures of one method, compared with the truth, and files that an interrupted run never leaves half written.
 
 use std::io::Write;
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use dapple_client::Drawn;
+use dapple_metrics::{PIXELS_PER_DEGREE, flip, psnr, psnr_masked, ssim};
+use dapple_render::compose::{ErrorKind, ResolvedPlane, resolve_plane, view_error, view_visibility};
+use dapple_render::image::{Rgb8Image, ToneMap};
+use dapple_scene::Scene;
+use dapple_trace::rtao::Site;
 
 /// Writes a whole file: into a neighbour first, then renamed over the old one.
 pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
@@ -32,4 +38,112 @@ pub(crate) fn write_png(path: &Path, width: u32, height: u32, rgb8: &[[u8; 3]]) 
     image::ImageEncoder::write_image(encoder, rgb8.as_flattened(), width, height, image::ExtendedColorType::Rgb8)
         .with_context(|| format!("cannot encode {}", path.display()))?;
     write_file(path, &bytes)
+}
+
+/// A picture with one method's visibility, resolved to pixels.
+pub(crate) struct Shown {
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    beauty: Vec<[u8; 3]>,
+    visibility_picture: Vec<[u8; 3]>,
+    visibility: ResolvedPlane,
+    /// Whether a pixel shows any geometry.
+    covered: Vec<bool>,
+    pub(crate) covered_pixels: usize,
+}
+
+/// Names of the pictures that were written, relative to their folder.
+pub(crate) struct Files {
+    pub(crate) beauty: String,
+    pub(crate) visibility: String,
+}
+
+impl Shown {
+    /// Composes `drawn` with one visibility a sample (all open for `None`).
+    pub(crate) fn new(drawn: &Drawn, visibility: Option<&[f32]>) -> Result<Shown> {
+        let gbuffer = &drawn.gbuffer;
+        let open;
+        let samples = match visibility {
+            Some(samples) => samples,
+            None => {
+                open = vec![1.0; gbuffer.samples().len()];
+                &open
+            }
+        };
+        let beauty = drawn.compose(visibility)?.to_rgb8(&ToneMap::default());
+        let visibility = resolve_plane(gbuffer, samples, 1.0)?;
+        let covered: Vec<bool> = visibility.coverage.values.iter().map(|&c| c > 0.0).collect();
+        Ok(Shown {
+            width: beauty.width,
+            height: beauty.height,
+            beauty: beauty.pixels,
+            visibility_picture: view_visibility(gbuffer, samples)?.pixels,
+            visibility,
+            covered_pixels: covered.iter().filter(|c| **c).count(),
+            covered,
+        })
+    }
+
+    /// Writes `STEM-beauty.png` and `STEM-visibility.png`.
+    pub(crate) fn write(&self, folder: &Path, stem: &str) -> Result<Files> {
+        let files = Files { beauty: format!("{stem}-beauty.png"), visibility: format!("{stem}-visibility.png") };
+        write_png(&folder.join(&files.beauty), self.width, self.height, &self.beauty)?;
+        write_png(&folder.join(&files.visibility), self.width, self.height, &self.visibility_picture)?;
+        Ok(files)
+    }
+}
+
+/// One picture against the truth.
+pub(crate) struct Compared {
+    /// PSNR of visibility over the pixels that show geometry; `None` if none does, infinite if equal.
+    pub(crate) visibility_psnr_db: Option<f64>,
+    /// PSNR of the 8-bit picture; infinite if equal.
+    pub(crate) psnr_db: f64,
+    pub(crate) ssim: f64,
+    pub(crate) flip: f64,
+    error: Rgb8Image,
+}
+
+impl Compared {
+    pub(crate) fn new(truth: &Shown, test: &Shown) -> Result<Compared> {
+        let (width, height) = (truth.width, truth.height);
+        let (truth_v, test_v) = (&truth.visibility.values, &test.visibility.values);
+        let visibility_psnr_db = match truth.covered_pixels {
+            0 => None,
+            _ => Some(psnr_masked(&truth_v.values, &test_v.values, &truth.covered, 1.0)?),
+        };
+        let [truth_rgb, test_rgb] = [&truth.beauty, &test.beauty].map(|p| p.as_flattened());
+        let unit = |bytes: &[u8]| bytes.iter().map(|&b| f32::from(b) / 255.0).collect::<Vec<f32>>();
+        Ok(Compared {
+            visibility_psnr_db,
+            psnr_db: psnr(&unit(truth_rgb), &unit(test_rgb), 1.0)?,
+            ssim: ssim(width, height, &luma(&truth.beauty), &luma(&test.beauty))?,
+            flip: flip(width, height, truth_rgb, test_rgb, PIXELS_PER_DEGREE)?.mean,
+            error: view_error(truth_v, test_v, &truth.visibility.coverage, ErrorKind::Signed)?,
+        })
+    }
+
+    /// Writes `STEM-error.png`, the difference in visibility, and returns its name.
+    pub(crate) fn write_error(&self, folder: &Path, stem: &str) -> Result<String> {
+        let name = format!("{stem}-error.png");
+        write_png(&folder.join(&name), self.error.width, self.error.height, &self.error.pixels)?;
+        Ok(name)
+    }
+}
+
+/// Rec. 709 luma of sRGB-encoded pixels, 0 … 1.
+fn luma(rgb8: &[[u8; 3]]) -> Vec<f32> {
+    let luma_of = |&[r, g, b]: &[u8; 3]| 0.2126 * f32::from(r) + 0.7152 * f32::from(g) + 0.0722 * f32::from(b);
+    rgb8.iter().map(|p| luma_of(p) / 255.0).collect()
+}
+
+/// Indices of the samples that show geometry, and where rays start for them.
+pub(crate) fn sites(scene: &Scene, drawn: &Drawn) -> (Vec<usize>, Vec<Site>) {
+    let found = drawn.gbuffer.map_surfaces(scene, &drawn.pose, |index, surface| {
+        surface.map(|s| {
+            let key = index as u64;
+            (index, Site { position_world: s.position_world, normal_world: s.normal_world, key })
+        })
+    });
+    found.into_iter().flatten().unzip()
 }

@@ -89,7 +89,7 @@ impl Client {
     pub fn visibility(&self, drawn: &Drawn, kernel: &Kernel) -> Vec<f32> {
         match (&self.index, self.subscriber.store()) {
             (Some(index), Some(store)) => {
-                let fragments = drawn.gbuffer.map_surfaces_rest(&self.scene, |surface| surface);
+                let fragments = drawn.gbuffer.map_surfaces_rest(&self.scene, |_, surface| surface.copied());
                 reconstruct(index, store.visibility(), kernel, &fragments)
             }
             _ => vec![1.0; drawn.gbuffer.samples().len()],

@@ -84,14 +84,3 @@ impl Scene {
             .collect()
     }
 }
-
-// MERGE: remove
-impl Scene {
-    /// Tight world box.
-    pub fn instance_bounds_world(&self, pose: &crate::Pose, instance: usize) -> crate::Aabb {
-        let posed = &pose.instances[instance];
-        let mesh = &self.meshes[self.instances[instance].mesh as usize];
-        let positions = posed.deformed.as_ref().map_or(&mesh.positions, |d| &d.positions);
-        crate::Aabb::from_points(positions.iter().map(|p| posed.world_from_mesh.transform_point3(*p)))
-    }
-}

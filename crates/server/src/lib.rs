@@ -6,6 +6,7 @@
 
 use std::sync::Arc;
 
+use dapple_scene::glam::Vec3;
 use dapple_scene::{Pose, Scene};
 use dapple_store::points::PointStore;
 use dapple_stream::{Frame, PublishError, Publisher, PublisherConfig};
@@ -126,6 +127,11 @@ impl Server {
     /// What has been published.
     pub fn store(&self) -> &PointStore {
         self.updater.store()
+    }
+
+    /// Where every point is in the world at `pose`, in the order of the store.
+    pub fn positions_world(&self, pose: &Pose) -> Vec<Option<Vec3>> {
+        self.updater.positions_world(&self.scene, pose)
     }
 
     /// Points that were not laid because they lie inside geometry.

@@ -1,7 +1,8 @@
 //! The paper's kernel: a hat with two thresholds on normals ([Neff2023] eq. 2–4).
 
 use super::index::Near;
-use super::{Fragment, PointIndex};
+use super::PointIndex;
+use crate::gbuffer::RestSurface;
 
 /// Parameters of [Neff2023] eq. 2 and 3.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +26,7 @@ impl Hat {
         &self,
         index: &PointIndex,
         visibility: &[u8],
-        fragment: &Fragment,
+        fragment: &RestSurface,
         near: &mut Near,
     ) -> f32 {
         let r = self.radius * index.spacing_m();

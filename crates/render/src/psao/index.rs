@@ -3,7 +3,7 @@
 use dapple_store::points::{CellGrid, PointLayout};
 use glam::Vec3;
 
-use super::Fragment;
+use crate::gbuffer::RestSurface;
 
 /// Decoded points in cells, one grid an instance. Made once for a layout.
 #[derive(Clone, Debug)]
@@ -67,7 +67,7 @@ impl PointIndex {
     }
 
     /// Collects the fragment's candidates into `near`: all its instance's points within `radius_m`, and some beyond.
-    pub(super) fn candidates(&self, fragment: &Fragment, radius_m: f32, near: &mut Near) {
+    pub(super) fn candidates(&self, fragment: &RestSurface, radius_m: f32, near: &mut Near) {
         let Some((at, set)) = self.set(fragment.instance) else {
             near.points.clear();
             near.key = None;
@@ -92,7 +92,7 @@ impl PointIndex {
 
     /// The point of the fragment's instance that is nearest to it among those on its side, or of all if none is;
     /// `None` for an instance without points within eight cells.
-    pub(super) fn nearest(&self, fragment: &Fragment, near: &mut Near) -> Option<u32> {
+    pub(super) fn nearest(&self, fragment: &RestSurface, near: &mut Near) -> Option<u32> {
         for reach in [1.0, 2.0, 4.0, 8.0] {
             let radius_m = reach * self.spacing_m * CELL_IN_SPACINGS;
             self.candidates(fragment, radius_m, near);

@@ -3,7 +3,8 @@
 use glam::Vec3;
 
 use super::index::Near;
-use super::{Fragment, PointIndex};
+use super::PointIndex;
+use crate::gbuffer::RestSurface;
 
 /// Parameters of the fit. Defaults were chosen on one pose of one scene and confirmed on others (`docs/evaluation.md`).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +33,7 @@ impl MovingLeastSquares {
         &self,
         index: &PointIndex,
         visibility: &[u8],
-        fragment: &Fragment,
+        fragment: &RestSurface,
         near: &mut Near,
     ) -> f32 {
         let r = self.radius * index.spacing_m();

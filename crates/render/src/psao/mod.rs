@@ -8,8 +8,9 @@ mod mls;
 #[cfg(test)]
 mod tests;
 
-use glam::Vec3;
 use rayon::prelude::*;
+
+use crate::gbuffer::RestSurface;
 
 pub use hat::Hat;
 pub use index::PointIndex;
@@ -30,17 +31,6 @@ impl Default for Kernel {
     }
 }
 
-/// A place on a surface that asks for its visibility.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fragment {
-    /// Index into the scene's instances.
-    pub instance: u32,
-    /// In the instance's rest space, metres.
-    pub position_rest: Vec3,
-    /// Unit geometric normal on the visible side.
-    pub normal_rest: Vec3,
-}
-
 /// Visibility 0 … 1 of each fragment (1 for `None`), in parallel in the caller's rayon pool.
 ///
 /// `visibility` are the store's values, in the order of the layout that `index` was made from.
@@ -51,7 +41,7 @@ pub fn reconstruct(
     index: &PointIndex,
     visibility: &[u8],
     kernel: &Kernel,
-    fragments: &[Option<Fragment>],
+    fragments: &[Option<RestSurface>],
 ) -> Vec<f32> {
     assert_eq!(visibility.len(), index.len(), "one value a point");
     fragments

@@ -5,6 +5,7 @@ use glam::Vec3;
 use proptest::prelude::*;
 
 use super::*;
+use crate::gbuffer::RestSurface;
 
 /// Points about every `spacing` on the square (0 … 1)² of y = `height`, with values from `value(position)`.
 fn plane(spacing: f32, height: f32, value: impl Fn(Vec3) -> f32) -> (PointLayout, Vec<u8>) {
@@ -31,8 +32,8 @@ fn plane(spacing: f32, height: f32, value: impl Fn(Vec3) -> f32) -> (PointLayout
     (layout, values)
 }
 
-fn at(x: f32, y: f32, z: f32) -> Option<Fragment> {
-    Some(Fragment { instance: 3, position_rest: Vec3::new(x, y, z), normal_rest: Vec3::Y })
+fn at(x: f32, y: f32, z: f32) -> Option<RestSurface> {
+    Some(RestSurface { instance: 3, position_rest: Vec3::new(x, y, z), normal_rest: Vec3::Y })
 }
 
 fn kernels() -> [Kernel; 2] {
@@ -77,12 +78,12 @@ fn least_squares_reproduces_a_gradient_even_at_the_border() {
 fn other_instances_and_other_sides_are_not_read() {
     let (layout, values) = plane(0.05, 0.0, |_| 0.2);
     let index = PointIndex::new(&layout);
-    let other = Fragment { instance: 2, ..at(0.5, 0.0, 0.5).unwrap() };
-    let beyond = Fragment { instance: 9, ..other };
+    let other = RestSurface { instance: 2, ..at(0.5, 0.0, 0.5).unwrap() };
+    let beyond = RestSurface { instance: 9, ..other };
     for kernel in kernels() {
         assert_eq!(reconstruct(&index, &values, &kernel, &[None, Some(other), Some(beyond)]), [1.0; 3]);
     }
-    let below = Fragment { normal_rest: -Vec3::Y, ..at(0.5, 0.0, 0.5).unwrap() };
+    let below = RestSurface { normal_rest: -Vec3::Y, ..at(0.5, 0.0, 0.5).unwrap() };
     assert_eq!(reconstruct(&index, &values, &kernels()[0], &[Some(below)]), [1.0]);
 }
 
@@ -116,7 +117,7 @@ proptest! {
         let values: Vec<u8> = (0..layout.len() as u32).map(|i| 40 + ((i ^ seed).wrapping_mul(2_654_435_761) >> 25) as u8).collect();
         let index = PointIndex::new(&layout);
         let normal_rest = Vec3::new(nx, 0.5, nz).normalize();
-        let f = Fragment { instance: 3, position_rest: Vec3::new(x, y, z), normal_rest };
+        let f = RestSurface { instance: 3, position_rest: Vec3::new(x, y, z), normal_rest };
         let v = reconstruct(&index, &values, &Kernel::default(), &[Some(f)])[0] * 255.0;
         prop_assert!((39.99..=167.01).contains(&v), "{}", v);
     }

@@ -11,6 +11,7 @@ use std::sync::Arc;
 
 use dapple_scene::{Aabb, Pose, Scene};
 use dapple_store::points::{Change, PointLayout, PointStore};
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::generate::{Anchor, GeneratedPoints};
@@ -110,6 +111,16 @@ impl Updater {
     /// What has been published: the state every subscriber converges to.
     pub fn store(&self) -> &PointStore {
         &self.store
+    }
+
+    /// Where every point is in the world at `pose` (`None` where its triangle has collapsed), in the order of the store.
+    pub fn positions_world(&self, scene: &Scene, pose: &Pose) -> Vec<Option<Vec3>> {
+        let sets = self.store.layout().sets().iter();
+        sets.flat_map(|set| (set.first..set.first + set.len() as u32).map(|point| (point, set.instance)))
+            .map(|(point, instance)| {
+                self.anchors[point as usize].pose(scene, pose, instance as usize).map(|posed| posed.position)
+            })
+            .collect()
     }
 
     /// Bytes held for each point: anchor, position, normal, value, and its share of the clusters.
