@@ -1,1 +1,19 @@
-//! fuzz
+//! Bodies of fuzz targets as plain functions: each takes any bytes and panics where a promise is broken.
+//!
+//! Ordinary tests replay the corpus and mutate it (`tests/replay.rs`); cargo-fuzz runs the same functions
+//! (`README.md`).
+
+pub mod corpus;
+mod frame;
+mod input;
+mod session;
+
+pub use frame::decode_frame;
+pub use input::Random;
+pub use session::session_ops;
+
+/// A target: its name, which is that of its folder in `corpus/`, and its body.
+pub type Target = (&'static str, fn(&[u8]));
+
+/// All targets.
+pub const TARGETS: [Target; 2] = [("decode_frame", decode_frame), ("session_ops", session_ops)];

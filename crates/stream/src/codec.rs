@@ -16,13 +16,13 @@ mod varint;
 pub(crate) use decode::{decode_layout, decode_steps, decode_values, parse_delta, parse_snapshot};
 #[cfg(feature = "zstd")]
 pub(crate) use encode::{delta_payload, encode_layout, snapshot_payload};
-pub use frame::{FrameHeader, FrameKind, MAGIC, VERSION, seal};
 pub(crate) use frame::open;
+pub use frame::{FrameHeader, FrameKind, MAGIC, VERSION, seal};
 
 use dapple_store::points::LayoutError;
 
 /// What a receiver is willing to take. Every allocation of a decoder is bounded by these, whatever the bytes say:
-/// at most 64 bytes for each of `max_points`, 64 for each of `max_sets`, and 8 MiB.
+/// at most 64 bytes for each of `max_points`, 256 for each of `max_sets`, and 8 MiB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Longest frame, bytes. Default 64 MiB.

@@ -4,10 +4,15 @@
 //! [`Frame`]s; a [`Subscriber`] turns any bytes back into the same store, bit for bit, or names what is wrong
 //! with them. The frames are specified in `docs/wire.md`; [`codec`] is the bits, [`session`] the order.
 
+#![cfg_attr(
+    test,
+    allow(clippy::unwrap_used, reason = "in a test, a failed unwrap is a failure like any other")
+)]
+
 pub mod codec;
 pub mod session;
 
 pub use codec::{DecodeError, FrameHeader, FrameKind, Limits};
+pub use session::{Applied, IgnoreReason, ReceiveError, Subscriber, ValueChange};
 #[cfg(feature = "zstd")]
 pub use session::{Frame, PublishError, Publisher, PublisherConfig};
-pub use session::{Applied, IgnoreReason, ReceiveError, Subscriber, ValueChange};

@@ -100,10 +100,7 @@ pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<PointLayout
 }
 
 /// The table of sets, still without points, and how many points each has: together within the limits.
-fn decode_sets(
-    reader: &mut Reader<'_>,
-    limits: &Limits,
-) -> Result<(Vec<PointSet>, Vec<usize>), DecodeError> {
+fn decode_sets(reader: &mut Reader<'_>, limits: &Limits) -> Result<(Vec<PointSet>, Vec<usize>), DecodeError> {
     let part = "sets";
     let count = reader.varint(part)?;
     if count > u64::from(limits.max_sets) {

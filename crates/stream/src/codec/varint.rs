@@ -97,6 +97,9 @@ mod tests {
         for bytes in [&[0x80, 0x00][..], &[0xff; 10], &[0x80; 12], &[], &[0x80]] {
             assert!(Reader::new(bytes).varint("test").is_err(), "{bytes:02x?}");
         }
-        assert_eq!(Reader::new(&[0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 1]).varint("test").unwrap(), u64::MAX);
+        assert_eq!(
+            Reader::new(&[0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 1]).varint("test").unwrap(),
+            u64::MAX
+        );
     }
 }

@@ -1,6 +1,6 @@
 //! States of a store → frames.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use dapple_store::points::{PointLayout, PointStore};
 
@@ -34,16 +34,8 @@ pub struct Frame {
 /// Why a state could not be published.
 #[derive(Debug, thiserror::Error)]
 pub enum PublishError {
-    /// Epochs must increase from call to call.
-    #[error("publish: epoch {epoch} after epoch {last}; epochs must increase")]
-    EpochNotIncreasing {
-        /// The one given.
-        epoch: u64,
-        /// The one before.
-        last: u64,
-    },
     /// The compressor failed, which means that memory ran out.
-    #[error("publish: compression failed: {0}")]
+    #[error("publish: compression failed: {0}; free memory and publish again")]
     Compress(#[from] std::io::Error),
 }
 
@@ -55,7 +47,7 @@ pub enum PublishError {
 pub struct Publisher {
     scene_hash: [u8; 32],
     config: PublisherConfig,
-    last_epoch: Option<u64>,
+    next_epoch: u64,
     state: Option<State>,
 }
 
@@ -70,27 +62,23 @@ struct State {
     epoch: u64,
     deltas: u32,
     /// The snapshot of this very state, once someone needed it.
-    snapshot: Option<Frame>,
+    snapshot: OnceLock<Frame>,
 }
 
 impl Publisher {
     /// A publisher of the scene with this hash. Nothing is sent before the first [`Publisher::publish`].
     pub fn new(scene_hash: [u8; 32], config: PublisherConfig) -> Publisher {
-        Publisher { scene_hash, config, last_epoch: None, state: None }
+        Publisher { scene_hash, config, next_epoch: 0, state: None }
     }
 
-    /// Publishes the state `store` at `epoch`, which must exceed the one of the call before. Gives the frame for
-    /// subscribers that are up to date, or `None` where they already hold this state: a still scene sends nothing.
+    /// Publishes the state of the next epoch; epochs count the calls, from 0. Gives the frame for subscribers
+    /// that are up to date, or `None` where they already hold this state: a still scene sends nothing.
     ///
     /// What changed is found here, by comparison with what subscribers hold. The frame is a delta, or a snapshot
     /// where a group starts: at first, with a new layout, and as [`PublisherConfig::deltas_per_group`] says.
     /// On an error nothing has happened.
-    pub fn publish(&mut self, epoch: u64, store: &PointStore) -> Result<Option<Frame>, PublishError> {
-        if let Some(last) = self.last_epoch
-            && epoch <= last
-        {
-            return Err(PublishError::EpochNotIncreasing { epoch, last });
-        }
+    pub fn publish(&mut self, store: &PointStore) -> Result<Option<Frame>, PublishError> {
+        let epoch = self.next_epoch;
         let frame = match &mut self.state {
             Some(state) if same_layout(&state.layout, store.layout()) => {
                 let full = self.config.deltas_per_group;
@@ -109,28 +97,28 @@ impl Publisher {
             }
             old => {
                 let group = old.as_ref().map_or(self.config.first_group, |state| state.group + 1);
-                let mut state = State {
+                let state = State {
                     layout: store.layout().clone(),
                     layout_bytes: encode_layout(store.layout())?,
                     visibility: store.visibility().to_vec(),
                     group,
                     epoch,
                     deltas: 0,
-                    snapshot: None,
+                    snapshot: OnceLock::new(),
                 };
                 let frame = state.snapshot(&self.scene_hash)?;
                 *old = Some(state);
                 Some(frame)
             }
         };
-        self.last_epoch = Some(epoch);
+        self.next_epoch = epoch + 1;
         Ok(frame)
     }
 
     /// What a subscriber that joins now, or fell behind, needs: one snapshot of the present state, after which
     /// it is up to date. `None` before the first [`Publisher::publish`].
-    pub fn join(&mut self) -> Result<Option<Frame>, PublishError> {
-        match &mut self.state {
+    pub fn join(&self) -> Result<Option<Frame>, PublishError> {
+        match &self.state {
             Some(state) => Ok(Some(state.snapshot(&self.scene_hash)?)),
             None => Ok(None),
         }
@@ -158,14 +146,13 @@ impl Publisher {
 
 impl State {
     /// The snapshot of the present state. Its layout part is only copied.
-    fn snapshot(&mut self, scene_hash: &[u8; 32]) -> Result<Frame, std::io::Error> {
-        if let Some(frame) = &self.snapshot {
+    fn snapshot(&self, scene_hash: &[u8; 32]) -> Result<Frame, std::io::Error> {
+        if let Some(frame) = self.snapshot.get() {
             return Ok(frame.clone());
         }
         let payload = snapshot_payload(scene_hash, &self.layout_bytes, &self.visibility)?;
         let frame = Frame::new(FrameKind::Snapshot, self.group, self.epoch, &payload);
-        self.snapshot = Some(frame.clone());
-        Ok(frame)
+        Ok(self.snapshot.get_or_init(|| frame).clone())
     }
 
     /// Puts the present values into a new group at `epoch`; on an error nothing has happened.
@@ -173,7 +160,7 @@ impl State {
         let payload = snapshot_payload(scene_hash, &self.layout_bytes, &self.visibility)?;
         let frame = Frame::new(FrameKind::Snapshot, self.group + 1, epoch, &payload);
         (self.group, self.epoch, self.deltas) = (self.group + 1, epoch, 0);
-        self.snapshot = Some(frame.clone());
+        self.snapshot = OnceLock::from(frame.clone());
         Ok(frame)
     }
 
@@ -185,7 +172,7 @@ impl State {
         self.visibility.copy_from_slice(visibility);
         self.epoch = epoch;
         self.deltas = self.deltas.saturating_add(1);
-        self.snapshot = None;
+        self.snapshot = OnceLock::new();
         Ok(Some(Frame::new(FrameKind::Delta, self.group, epoch, &payload)))
     }
 }

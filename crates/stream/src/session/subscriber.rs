@@ -5,8 +5,8 @@ use std::sync::Arc;
 use dapple_store::points::{Change, PointLayout, PointStore, StoreError};
 
 use crate::codec::{
-    DecodeError, FrameHeader, FrameKind, Limits, decode_layout, decode_steps, decode_values, open, parse_delta,
-    parse_snapshot,
+    DecodeError, FrameHeader, FrameKind, Limits, decode_layout, decode_steps, decode_values, open,
+    parse_delta, parse_snapshot,
 };
 
 /// What a frame did to the store, so that the receiver redoes only that.
@@ -84,7 +84,9 @@ impl ReceiveError {
             ReceiveError::WrongScene { .. } => false,
             ReceiveError::Decode(error) => matches!(
                 error,
-                DecodeError::Truncated { .. } | DecodeError::TrailingBytes { .. } | DecodeError::Corrupt { .. }
+                DecodeError::Truncated { .. }
+                    | DecodeError::TrailingBytes { .. }
+                    | DecodeError::Corrupt { .. }
             ),
         }
     }
@@ -195,7 +197,8 @@ impl Subscriber {
 
     fn receive_delta(&mut self, header: &FrameHeader, payload: &[u8]) -> Result<Applied, ReceiveError> {
         let parts = parse_delta(header.epoch, payload)?;
-        let need = |held| ReceiveError::NeedSnapshot { group: header.group, base_epoch: parts.base_epoch, held };
+        let need =
+            |held| ReceiveError::NeedSnapshot { group: header.group, base_epoch: parts.base_epoch, held };
         let state = self.state.as_mut().ok_or(need(None))?;
         if (state.group, state.epoch) != (header.group, parts.base_epoch) {
             return Err(need(Some((state.group, state.epoch))));

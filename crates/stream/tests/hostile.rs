@@ -1,0 +1,174 @@
+//! Bytes that are no frames, or wrong ones under a right checksum: always a named error, never a panic or a change.
+
+#![allow(clippy::unwrap_used, reason = "in a test, a failed unwrap is a failure like any other")]
+
+#[path = "common/cloud.rs"]
+mod cloud;
+
+use std::sync::LazyLock;
+
+use dapple_store::points::PointStore;
+use dapple_stream::codec::seal;
+use dapple_stream::{
+    Applied, DecodeError, FrameHeader, FrameKind, Limits, Publisher, PublisherConfig, ReceiveError,
+    Subscriber,
+};
+use proptest::prelude::*;
+
+/// A store large enough for compressed sections, its snapshot (epoch 10), and the delta to a later state (epoch 12).
+static SAMPLE: LazyLock<(PointStore, Vec<u8>, Vec<u8>)> = LazyLock::new(|| {
+    let store = cloud::hall(3, 3000);
+    let mut publisher = Publisher::new([1; 32], PublisherConfig::default());
+    for seed in 0..10 {
+        publisher.publish(&cloud::moved(&store, seed, 0.01)).unwrap();
+    }
+    publisher.publish(&store).unwrap();
+    let snapshot = publisher.join().unwrap().unwrap();
+    assert!(publisher.publish(&store).unwrap().is_none());
+    let delta = publisher.publish(&cloud::moved(&store, 4, 0.1)).unwrap().unwrap();
+    (store, snapshot.bytes.to_vec(), delta.bytes.to_vec())
+});
+
+fn payload(frame: &[u8]) -> Vec<u8> {
+    let header = FrameHeader::parse(frame, &Limits::default()).unwrap();
+    frame[header.header_bytes..][..header.payload_bytes].to_vec()
+}
+
+fn holding() -> Subscriber {
+    let mut subscriber = Subscriber::new(None, Limits::default());
+    subscriber.receive(&SAMPLE.1).unwrap();
+    subscriber
+}
+
+/// Receives; on an error nothing may have changed.
+fn receive(subscriber: &mut Subscriber, bytes: &[u8]) -> Result<Applied, ReceiveError> {
+    let before = subscriber.clone();
+    let result = subscriber.receive(bytes);
+    if !matches!(result, Ok(Applied::NewLayout | Applied::Changes(_))) {
+        assert!(before.store() == subscriber.store());
+        assert_eq!((before.group(), before.epoch()), (subscriber.group(), subscriber.epoch()));
+    }
+    result
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn random_bytes_are_refused(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        prop_assert!(matches!(receive(&mut holding(), &bytes), Err(ReceiveError::Decode(_))));
+    }
+
+    #[test]
+    fn random_payloads_do_no_harm(bytes in prop::collection::vec(any::<u8>(), 0..200), snapshot: bool) {
+        let kind = if snapshot { FrameKind::Snapshot } else { FrameKind::Delta };
+        let _ = receive(&mut holding(), &seal(kind, 0, 12, &bytes));
+        let _ = receive(&mut Subscriber::new(None, Limits::default()), &seal(kind, 0, 12, &bytes));
+    }
+
+    #[test]
+    fn flipped_bits_are_noticed(delta: bool, at: prop::sample::Index, bit in 0u32..8) {
+        let mut bytes = if delta { SAMPLE.2.clone() } else { SAMPLE.1.clone() };
+        bytes[at.index(SAMPLE.2.len())] ^= 1u8 << bit;
+        prop_assert!(matches!(receive(&mut holding(), &bytes), Err(ReceiveError::Decode(_))));
+    }
+
+    #[test]
+    fn damage_under_a_right_checksum_does_no_harm(
+        delta: bool,
+        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
+        cut in prop::option::weighted(0.2, any::<prop::sample::Index>()),
+    ) {
+        let mut bytes = payload(if delta { &SAMPLE.2 } else { &SAMPLE.1 });
+        for (at, value) in &edits {
+            // Headers lie at the front, where half of the edits go.
+            let range = if value % 2 == 0 { bytes.len() } else { bytes.len().min(300) };
+            let at = at.index(range);
+            bytes[at] = *value;
+        }
+        if let Some(cut) = cut {
+            bytes.truncate(cut.index(bytes.len()));
+        }
+        let kind = if delta { FrameKind::Delta } else { FrameKind::Snapshot };
+        let frame = seal(kind, 0, 12, &bytes);
+        let mut subscriber = if delta { holding() } else { Subscriber::new(None, Limits::default()) };
+        let _ = receive(&mut subscriber, &frame);
+    }
+}
+
+#[test]
+fn every_cut_of_a_frame_is_named_so() {
+    for frame in [&SAMPLE.1, &SAMPLE.2] {
+        for cut in (0..frame.len()).step_by(7) {
+            let error = receive(&mut holding(), &frame[..cut]).unwrap_err();
+            assert!(
+                matches!(error, ReceiveError::Decode(DecodeError::Truncated { .. })),
+                "cut at {cut}: {error}"
+            );
+            assert!(error.snapshot_helps());
+        }
+    }
+}
+
+#[test]
+fn limits_hold() {
+    let points = SAMPLE.0.layout().len() as u32;
+    let sets = SAMPLE.0.layout().sets().len() as u32;
+    let exact = Limits { max_points: points, max_sets: sets, max_frame_bytes: SAMPLE.1.len() };
+    assert_eq!(Subscriber::new(None, exact).receive(&SAMPLE.1), Ok(Applied::NewLayout));
+    for limits in [
+        Limits { max_points: points - 1, ..exact },
+        Limits { max_sets: sets - 1, ..exact },
+        Limits { max_frame_bytes: SAMPLE.1.len() - 1, ..exact },
+    ] {
+        let error = Subscriber::new(None, limits).receive(&SAMPLE.1).unwrap_err();
+        assert!(matches!(error, ReceiveError::Decode(DecodeError::TooLarge { .. })), "{error}");
+    }
+}
+
+/// Payloads written by hand, each of which breaks one rule of docs/wire.md.
+#[test]
+fn rules_of_the_format_are_enforced() {
+    // A layout of one point at (1, 2, 3): quantum 1, spacing 1, 0 local bits, one set.
+    let layout = |cell: u8, local: u8, normal: u8| {
+        let mut out = Vec::new();
+        out.extend(1f32.to_le_bytes());
+        out.extend(1f32.to_le_bytes());
+        out.extend([0, 1, 0]);
+        out.extend([0; 12]);
+        out.extend([1, 2, normal, 2, 0, 2, cell, 2, local, 2, 0, 2, 0]);
+        out
+    };
+    let snapshot = |layout: Vec<u8>, values: &[u8]| {
+        let mut out = vec![0; 32];
+        out.push(layout.len() as u8);
+        out.extend(layout);
+        out.extend(values);
+        Subscriber::new(None, Limits::default()).receive(&seal(FrameKind::Snapshot, 0, 0, &out))
+    };
+    assert_eq!(snapshot(layout(53, 0, 0), &[2, 0]), Ok(Applied::NewLayout), "the rest would prove nothing");
+    let reason = |result: Result<Applied, ReceiveError>| result.unwrap_err().to_string();
+    assert!(reason(snapshot(layout(53, 1, 0), &[2, 0])).contains("exceed the cell"));
+    assert!(reason(snapshot(layout(0x80, 0, 0), &[2, 0])).contains("cell gaps: ends early"));
+    assert!(reason(snapshot(layout(53, 0, 0), &[2, 0, 0])).contains("bytes after"));
+    assert!(reason(snapshot(layout(53, 0, 0), &[4, 0, 0])).contains("does not fit the number of points"));
+    assert!(reason(snapshot(layout(53, 0, 0), &[2])).contains("values: ends early"));
+    let mut bad = layout(53, 0, 0);
+    bad[8] = 9;
+    assert!(reason(snapshot(bad, &[2, 0])).contains("local bits"));
+    let mut bad = layout(53, 0, 0);
+    bad[0..4].copy_from_slice(&f32::NAN.to_le_bytes());
+    assert!(reason(snapshot(bad, &[2, 0])).contains("quantum_m is NaN"));
+
+    let delta = |payload: &[u8]| holding().receive(&seal(FrameKind::Delta, 0, 12, payload));
+    assert!(matches!(delta(&[2, 1, 2, 5, 2, 9]), Ok(Applied::Changes(list)) if list.len() == 1));
+    assert!(reason(delta(&[0, 1, 2, 5, 2, 9])).contains("is the frame's own"));
+    assert!(reason(delta(&[13, 1, 2, 5, 2, 9])).contains("is negative"));
+    assert!(reason(delta(&[2, 0, 0, 0])).contains("are none"));
+    assert!(reason(delta(&[2, 1, 2, 5, 2, 0])).contains("leave a value as it was"));
+    assert!(reason(delta(&[2, 1, 2, 5, 2, 9, 0])).contains("bytes after"));
+    assert!(reason(delta(&[2, 1, 4, 5, 0, 2, 9])).contains("more than there are changes"));
+    assert!(reason(delta(&[2, 1, 8, 0xff, 0xff, 0xff, 1, 2, 9])).contains("does not exist"));
+    assert!(reason(delta(&[2, 1, 4, 0x85, 0, 2, 9])).contains("shortest form"));
+    assert!(reason(delta(&[3, 1, 2, 5, 2, 9])).contains("ask for a snapshot"));
+}

@@ -1,0 +1,274 @@
+//! Whatever is published, and however frames are lost, doubled or swapped: who listens ends up with the same store.
+
+#![allow(clippy::unwrap_used, reason = "in a test, a failed unwrap is a failure like any other")]
+
+mod common;
+#[path = "common/random.rs"]
+mod random;
+
+use common::same_bits;
+use dapple_store::points::{Change, PointStore};
+use dapple_stream::{
+    Applied, Frame, FrameKind, IgnoreReason, Limits, Publisher, PublisherConfig, ReceiveError, Subscriber,
+};
+use proptest::prelude::*;
+use random::stores;
+
+const SCENE: [u8; 32] = [7; 32];
+
+fn subscriber() -> Subscriber {
+    Subscriber::new(Some(SCENE), Limits::default())
+}
+
+/// What happens at an epoch.
+#[derive(Clone, Debug)]
+enum Step {
+    /// Some values change (places and new values; perhaps to what they were).
+    Change(Vec<(prop::sample::Index, u8)>),
+    /// Nothing changes.
+    Still,
+    /// Another layout.
+    Layout(PointStore),
+    /// The publisher is asked for a new group.
+    Group,
+}
+
+fn steps() -> impl Strategy<Value = Vec<Step>> {
+    let change = prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..40);
+    prop::collection::vec(
+        prop_oneof![
+            8 => change.prop_map(Step::Change),
+            2 => Just(Step::Still),
+            1 => stores().prop_map(Step::Layout),
+            1 => Just(Step::Group),
+        ],
+        0..25,
+    )
+}
+
+/// All that a run of a publisher shows: its state after each step, its frames, and what a joiner would be given.
+struct Run {
+    states: Vec<PointStore>,
+    frames: Vec<Vec<Frame>>,
+    joins: Vec<Frame>,
+}
+
+fn run(start: &PointStore, steps: &[Step], config: PublisherConfig) -> Run {
+    let mut publisher = Publisher::new(SCENE, config);
+    assert!(publisher.join().unwrap().is_none());
+    let mut store = start.clone();
+    let mut run = Run { states: Vec::new(), frames: Vec::new(), joins: Vec::new() };
+    for (index, step) in std::iter::once(&Step::Still).chain(steps).enumerate() {
+        let mut frames = Vec::new();
+        match step {
+            Step::Change(changes) if !store.visibility().is_empty() => {
+                let points = store.visibility().len();
+                let changes: Vec<Change> = changes
+                    .iter()
+                    .map(|(at, value)| Change { point: at.index(points) as u32, visibility: *value })
+                    .collect();
+                store.apply(&changes).unwrap();
+            }
+            Step::Layout(other) => store = other.clone(),
+            Step::Group => frames.extend(publisher.start_group().unwrap()),
+            Step::Change(_) | Step::Still => {}
+        }
+        frames.extend(publisher.publish(&store).unwrap());
+        if matches!(step, Step::Still) && index > 0 {
+            assert!(frames.is_empty(), "a still scene sends nothing");
+        }
+        run.states.push(store.clone());
+        run.frames.push(frames);
+        run.joins.push(publisher.join().unwrap().expect("something is published"));
+    }
+    run
+}
+
+fn config() -> impl Strategy<Value = PublisherConfig> {
+    (prop_oneof![Just(0u64), 1u64 << 40..1 << 41], 0u32..5)
+        .prop_map(|(first_group, deltas_per_group)| PublisherConfig { first_group, deltas_per_group })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(96))]
+
+    #[test]
+    fn whoever_joins_at_any_epoch_follows_bit_for_bit(
+        start in stores(), steps in steps(), config in config(), at: prop::sample::Index,
+    ) {
+        let run = run(&start, &steps, config);
+        let at = at.index(run.states.len());
+        let mut late = subscriber();
+        late.receive(&run.joins[at].bytes).unwrap();
+        prop_assert!(same_bits(late.store().unwrap(), &run.states[at]));
+        for (state, frames) in run.states.iter().zip(&run.frames).skip(at + 1) {
+            for frame in frames {
+                let before = late.store().unwrap().clone();
+                let applied = late.receive(&frame.bytes).unwrap();
+                prop_assert_eq!((late.group(), late.epoch()), (Some(frame.group), Some(frame.epoch)));
+                if let Applied::Changes(changes) = applied {
+                    let mut redone = before;
+                    for change in &changes {
+                        prop_assert_eq!(redone.visibility()[change.point as usize], change.old);
+                        prop_assert_ne!(change.old, change.new);
+                    }
+                    let news: Vec<Change> =
+                        changes.iter().map(|c| Change { point: c.point, visibility: c.new }).collect();
+                    redone.apply(&news).unwrap();
+                    prop_assert!(same_bits(&redone, late.store().unwrap()));
+                }
+            }
+            prop_assert!(same_bits(late.store().unwrap(), state));
+        }
+        prop_assert_eq!(late.epoch(), Some(run.joins.last().unwrap().epoch));
+    }
+
+    #[test]
+    fn every_group_alone_leads_to_its_last_state(
+        start in stores(), steps in steps(), config in config(),
+    ) {
+        let run = run(&start, &steps, config);
+        let mut subscriber_of_group = None;
+        for (state, frames) in run.states.iter().zip(&run.frames) {
+            for frame in frames {
+                if frame.kind == FrameKind::Snapshot {
+                    subscriber_of_group = Some((frame.group, subscriber()));
+                }
+                let (group, subscriber) = subscriber_of_group.as_mut().expect("the first frame is a snapshot");
+                prop_assert_eq!(*group, frame.group);
+                subscriber.receive(&frame.bytes).unwrap();
+            }
+            prop_assert!(same_bits(subscriber_of_group.as_ref().unwrap().1.store().unwrap(), state));
+        }
+        if config.deltas_per_group > 0 {
+            let mut deltas = 0;
+            for frame in run.frames.iter().flatten() {
+                deltas = if frame.kind == FrameKind::Snapshot { 0 } else { deltas + 1 };
+                prop_assert!(deltas <= config.deltas_per_group);
+            }
+        }
+    }
+
+    #[test]
+    fn loss_doubling_and_swapping_converge_after_a_rejoin(
+        start in stores(), steps in steps(), config in config(),
+        fates in prop::collection::vec((0u8..4, any::<prop::sample::Index>()), 60),
+    ) {
+        let run = run(&start, &steps, config);
+        let mut line: Vec<Frame> = run.frames.iter().flatten().cloned().collect();
+        for (index, (fate, other)) in fates.iter().enumerate().take(line.len()) {
+            let other = other.index(line.len());
+            match fate {
+                0 => line.swap(index, other),
+                1 => line[index] = line[other].clone(),
+                _ => {}
+            }
+        }
+        let mut lossy = subscriber();
+        for frame in &line {
+            let before = lossy.clone();
+            match lossy.receive(&frame.bytes) {
+                Ok(Applied::Ignored(reason)) => {
+                    let held = (before.group().unwrap(), before.epoch().unwrap());
+                    let expected = if frame.group < held.0 {
+                        IgnoreReason::OlderGroup
+                    } else if frame.epoch < held.1 {
+                        IgnoreReason::OldEpoch
+                    } else {
+                        IgnoreReason::Duplicate
+                    };
+                    prop_assert_eq!(reason, expected);
+                    prop_assert!(before.store() == lossy.store());
+                }
+                Ok(_) => prop_assert_eq!((lossy.group(), lossy.epoch()), (Some(frame.group), Some(frame.epoch))),
+                Err(error) => {
+                    let gap = matches!(error, ReceiveError::NeedSnapshot { group, .. } if group == frame.group);
+                    prop_assert!(gap && error.snapshot_helps(), "{}", error);
+                    prop_assert!(before.store() == lossy.store() && before.epoch() == lossy.epoch());
+                }
+            }
+            // Whatever it holds is a state that was published.
+            if let Some(store) = lossy.store() {
+                prop_assert!(run.states.iter().any(|state| same_bits(state, store)));
+            }
+        }
+        lossy.receive(&run.joins.last().unwrap().bytes).unwrap();
+        prop_assert!(same_bits(lossy.store().unwrap(), run.states.last().unwrap()));
+        for frame in run.frames.iter().flatten() {
+            let applied = lossy.receive(&frame.bytes).unwrap();
+            prop_assert!(matches!(applied, Applied::Ignored(_)));
+        }
+    }
+
+    #[test]
+    fn the_same_history_gives_the_same_bytes(start in stores(), steps in steps(), config in config()) {
+        let (a, b) = (run(&start, &steps, config), run(&start, &steps, config));
+        prop_assert_eq!(a.frames, b.frames);
+        prop_assert_eq!(a.joins, b.joins);
+    }
+}
+
+fn small() -> PointStore {
+    let layout = dapple_store::points::PointLayout::new(
+        0.01,
+        0.32,
+        vec![common::set(3, [1.0, 2.0, 3.0], (0..100).map(|i| ([i, 0, i * i], [127, 254])).collect())],
+    )
+    .unwrap();
+    PointStore::new(layout.into(), vec![200; 100]).unwrap()
+}
+
+#[test]
+fn a_delta_of_one_change_is_tens_of_bytes() {
+    let mut store = small();
+    let mut publisher =
+        Publisher::new(SCENE, PublisherConfig { first_group: 1_795_000_000_000, ..Default::default() });
+    publisher.publish(&store).unwrap();
+    store.apply(&[Change { point: 42, visibility: 17 }]).unwrap();
+    let frame = publisher.publish(&store).unwrap().unwrap();
+    assert!(frame.bytes.len() <= 26, "{} bytes", frame.bytes.len());
+    assert!(publisher.publish(&store).unwrap().is_none());
+}
+
+#[test]
+fn a_gap_is_named_and_a_new_group_of_the_same_layout_is_only_changes() {
+    let mut store = small();
+    let mut publisher = Publisher::new(SCENE, PublisherConfig { first_group: 5, deltas_per_group: 0 });
+    let mut receiver = subscriber();
+    let first = publisher.publish(&store).unwrap().unwrap();
+    store.apply(&[Change { point: 0, visibility: 1 }]).unwrap();
+    let second = publisher.publish(&store).unwrap().unwrap();
+    assert_eq!(
+        receiver.receive(&second.bytes),
+        Err(ReceiveError::NeedSnapshot { group: 5, base_epoch: 0, held: None })
+    );
+    store.apply(&[Change { point: 0, visibility: 2 }]).unwrap();
+    let mut still = store.clone();
+    still.apply(&[Change { point: 0, visibility: 1 }]).unwrap();
+    assert!(publisher.publish(&still).unwrap().is_none(), "epoch 2 is silent");
+    let third = publisher.publish(&store).unwrap().unwrap();
+    assert_eq!(receiver.receive(&first.bytes), Ok(Applied::NewLayout));
+    let error = receiver.receive(&third.bytes).unwrap_err();
+    assert_eq!(error, ReceiveError::NeedSnapshot { group: 5, base_epoch: 1, held: Some((5, 0)) });
+    assert!(error.to_string().contains("group 5, epoch 0"), "{error}");
+    let layout = receiver.store().unwrap().layout().clone();
+    let again = publisher.start_group().unwrap().unwrap();
+    assert_eq!((again.group, again.epoch), (6, 3));
+    let changes = vec![dapple_stream::ValueChange { point: 0, old: 200, new: 2 }];
+    assert_eq!(receiver.receive(&again.bytes), Ok(Applied::Changes(changes)));
+    assert!(std::sync::Arc::ptr_eq(&layout, receiver.store().unwrap().layout()));
+    assert_eq!(receiver.receive(&third.bytes), Ok(Applied::Ignored(IgnoreReason::OlderGroup)));
+}
+
+#[test]
+fn another_scene_is_refused() {
+    let store = small();
+    let mut publisher = Publisher::new([9; 32], PublisherConfig::default());
+    let frame = publisher.publish(&store).unwrap().unwrap();
+    let error = subscriber().receive(&frame.bytes).unwrap_err();
+    assert_eq!(error, ReceiveError::WrongScene { expected: SCENE, found: [9; 32] });
+    assert!(!error.snapshot_helps());
+    let mut any = Subscriber::new(None, Limits::default());
+    any.receive(&frame.bytes).unwrap();
+    assert_eq!(any.scene_hash(), Some([9; 32]));
+}

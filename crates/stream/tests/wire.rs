@@ -1,0 +1,107 @@
+//! The test vectors of `docs/wire.md`, read from the document itself: it and the code cannot drift apart.
+
+#![allow(clippy::unwrap_used, reason = "in a test, a failed unwrap is a failure like any other")]
+
+mod common;
+
+use dapple_store::points::{Change, PointLayout, PointStore};
+use dapple_stream::{Applied, FrameHeader, Limits, Publisher, PublisherConfig, Subscriber, ValueChange};
+
+const DOCUMENT: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/wire.md"));
+
+/// The bytes of the fenced block ```` ```hex name ````; what follows a `#` in a line is a comment.
+fn vector(name: &str) -> Vec<u8> {
+    let start = DOCUMENT.find(&format!("```hex {name}\n")).unwrap_or_else(|| panic!("no vector {name}"));
+    DOCUMENT[start..]
+        .lines()
+        .skip(1)
+        .take_while(|line| *line != "```")
+        .flat_map(|line| line.split('#').next().unwrap_or_default().split_whitespace())
+        .map(|byte| u8::from_str_radix(byte, 16).unwrap_or_else(|_| panic!("{name}: {byte} is no byte")))
+        .collect()
+}
+
+/// The scene hash of the vectors: 00 01 … 1f.
+fn scene_hash() -> [u8; 32] {
+    std::array::from_fn(|i| i as u8)
+}
+
+/// The store that the document describes.
+fn described() -> PointStore {
+    let facing_z = [127, 127];
+    let sets = vec![
+        common::set(
+            0,
+            [-1.0, 0.0, 0.5],
+            vec![
+                ([0, 0, 0], facing_z),
+                ([30, 0, 9], facing_z),
+                ([3, 0, 33], facing_z),
+                ([40, 1, 40], [127, 190]),
+            ],
+        ),
+        common::set(2, [0.0, 2.0, 0.0], vec![([2_097_151, 0, 0], [0, 127])]),
+    ];
+    let layout = PointLayout::new(0.001953125, 0.0625, sets).unwrap();
+    PointStore::new(layout.into(), vec![255, 250, 128, 0, 64]).unwrap()
+}
+
+fn changes() -> [Change; 2] {
+    [Change { point: 1, visibility: 240 }, Change { point: 4, visibility: 70 }]
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x} ")).collect()
+}
+
+#[test]
+fn the_vectors_decode_to_what_is_described() {
+    let mut subscriber = Subscriber::new(Some(scene_hash()), Limits::default());
+    assert_eq!(subscriber.receive(&vector("snapshot")), Ok(Applied::NewLayout));
+    let mut expected = described();
+    assert!(common::same_bits(subscriber.store().unwrap(), &expected));
+    assert_eq!((subscriber.group(), subscriber.epoch()), (Some(300), Some(5)));
+
+    let list = vec![ValueChange { point: 1, old: 250, new: 240 }, ValueChange { point: 4, old: 64, new: 70 }];
+    assert_eq!(subscriber.receive(&vector("delta")), Ok(Applied::Changes(list)));
+    expected.apply(&changes()).unwrap();
+    assert!(common::same_bits(subscriber.store().unwrap(), &expected));
+    assert_eq!((subscriber.group(), subscriber.epoch()), (Some(300), Some(7)));
+}
+
+#[test]
+fn encoding_gives_the_vectors() {
+    let config = PublisherConfig { first_group: 300, deltas_per_group: 0 };
+    let mut publisher = Publisher::new(scene_hash(), config);
+    let mut store = described();
+    // Epochs 0 to 4 show other values; a joiner at epoch 5 gets the snapshot.
+    for value in 0..5 {
+        publisher.publish(&PointStore::new(store.layout().clone(), vec![value; 5]).unwrap()).unwrap();
+    }
+    publisher.publish(&store).unwrap();
+    let snapshot = publisher.join().unwrap().unwrap();
+    assert_eq!(hex(&vector("snapshot")), hex(&snapshot.bytes));
+    assert!(publisher.publish(&store).unwrap().is_none());
+    store.apply(&changes()).unwrap();
+    let delta = publisher.publish(&store).unwrap().unwrap();
+    assert_eq!(hex(&vector("delta")), hex(&delta.bytes));
+}
+
+/// The compressed vector: 64 points in a row, all of which go from 0 to 1.
+#[test]
+fn the_compressed_vector_decodes() {
+    let points = (0..64).map(|i| ([i, 0, 0], [127, 254])).collect();
+    let layout = PointLayout::new(1.0, 1.0, vec![common::set(0, [0.0; 3], points)]).unwrap();
+    let mut store = PointStore::new(layout.into(), vec![0; 64]).unwrap();
+    let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
+    let mut subscriber = Subscriber::new(None, Limits::default());
+    subscriber.receive(&publisher.publish(&store).unwrap().unwrap().bytes).unwrap();
+    let bytes = vector("compressed");
+    let applied = subscriber.receive(&bytes);
+    store = PointStore::new(store.layout().clone(), vec![1; 64]).unwrap();
+    let own = publisher.publish(&store).unwrap().unwrap();
+    assert!(matches!(applied, Ok(Applied::Changes(list)) if list.len() == 64), "ours: {}", hex(&own.bytes));
+    assert!(common::same_bits(subscriber.store().unwrap(), &store));
+    let header = FrameHeader::parse(&bytes, &Limits::default()).unwrap();
+    assert!(header.payload_bytes < 64, "it is compressed");
+}

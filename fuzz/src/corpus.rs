@@ -1,0 +1,64 @@
+//! The seeds that fuzzing starts from: one of each thing a stream can carry. Written to `corpus/` by
+//! `cargo run -p dapple-fuzz --example corpus`.
+
+use dapple_store::points::{Change, PointStore};
+use dapple_stream::{Frame, FrameHeader, FrameKind, Limits, Publisher, PublisherConfig};
+
+use crate::input::{Input, Random};
+
+/// The store that seeds and targets have in common: regular enough that its sections compress.
+pub(crate) fn sample() -> PointStore {
+    let mut bytes = vec![2, 0];
+    for set in 0..2u8 {
+        bytes.extend([set, 3, 40, 0]);
+        for i in 0..40u8 {
+            bytes.extend([i % 8 * 4, i / 8 * 4, 7, 127, 1]);
+        }
+        bytes.push(9);
+    }
+    bytes.extend([32]);
+    bytes.extend((0..80).map(|i| if i % 11 == 0 { 128 } else { 255 }));
+    Input(&bytes).store()
+}
+
+/// Target, name and content of every seed.
+pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
+    let mut seeds = Vec::new();
+    let mut frame = |name: &str, frame: &Frame| {
+        seeds.push(("decode_frame", format!("{name}-frame"), frame.bytes.to_vec()));
+        let header = FrameHeader::parse(&frame.bytes, &Limits::default()).expect("a sound frame");
+        let payload = &frame.bytes[header.header_bytes..][..header.payload_bytes];
+        let kind = u8::from(frame.kind == FrameKind::Delta);
+        seeds.push(("decode_frame", format!("{name}-payload"), [&[kind], payload].concat()));
+    };
+    let publish = |publisher: &mut Publisher, store: &PointStore| {
+        publisher.publish(store).expect("memory suffices").expect("a change")
+    };
+    let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
+    let mut store = sample();
+    frame("snapshot", &publish(&mut publisher, &store));
+    store.apply(&[Change { point: 17, visibility: 3 }]).expect("it exists");
+    frame("delta-of-one", &publish(&mut publisher, &store));
+    let mut all = Publisher::new([0; 32], PublisherConfig::default());
+    publish(&mut all, &sample());
+    let inverse = sample().visibility().iter().map(|v| v ^ 0x55).collect();
+    frame(
+        "delta-of-all",
+        &publish(&mut all, &PointStore::new(sample().layout().clone(), inverse).expect("as many")),
+    );
+    let mut empty = Publisher::new([0; 32], PublisherConfig::default());
+    frame("empty", &publish(&mut empty, &Input(&[]).store()));
+
+    // A store of one set of two points, then calls: random ones, and every one once.
+    let start = [5, 2, 1, 0, 0, 0, 2, 0, 1, 2, 3, 9, 1, 4, 5, 6, 9, 1, 0, 32, 100, 200];
+    for seed in 0..6 {
+        let mut random = Random(seed);
+        let calls: Vec<u8> = (0..100 + 60 * seed).map(|_| random.bits() as u8).collect();
+        seeds.push(("session_ops", format!("random-{seed}"), [&start[..], &calls].concat()));
+    }
+    let mut calls = start.to_vec();
+    calls.extend([5, 0, 0, 0, 0, 0, 2, 0, 0, 0, 7, 1, 0, 9, 6, 0, 0, 0, 0, 3, 0, 1, 2, 4, 7, 0, 0]);
+    calls.extend([1, 1, 0, 1, 0, 77, 3, 0, 0, 64, 7, 1, 0, 5, 1, 0, 1, 0]);
+    seeds.push(("session_ops", "each-call".to_owned(), calls));
+    seeds
+}

@@ -1,0 +1,53 @@
+//! Any bytes into a subscriber, as a frame and as a payload under a right checksum.
+
+use std::sync::LazyLock;
+
+use dapple_stream::codec::seal;
+use dapple_stream::{Applied, FrameHeader, FrameKind, Limits, Subscriber};
+
+use crate::corpus;
+use crate::input::fingerprint;
+
+/// Small, so that what a few bytes claim stays fast to make.
+const LIMITS: Limits = Limits { max_frame_bytes: 1 << 16, max_points: 1 << 16, max_sets: 256 };
+
+/// A subscriber that holds the sample store at group 0, epoch 0.
+static HOLDING: LazyLock<Subscriber> = LazyLock::new(|| {
+    let mut subscriber = Subscriber::new(None, LIMITS);
+    subscriber.receive(&fingerprint(&corpus::sample())).expect("a sound frame");
+    subscriber
+});
+
+/// Receives `data` as it is, and its bytes after the first as the payload of a snapshot or (first byte odd) delta
+/// for epoch 1 of group 0. Nothing may panic; an error changes nothing; what was taken can be sent on.
+pub fn decode_frame(data: &[u8]) {
+    // A header is read from a prefix just as from the whole.
+    if let Ok(header) = FrameHeader::parse(data, &LIMITS) {
+        assert_eq!(FrameHeader::parse(&data[..header.header_bytes], &LIMITS), Ok(header));
+        assert!(header.frame_bytes() <= LIMITS.max_frame_bytes);
+    }
+    receive(data);
+    if let Some((kind, payload)) = data.split_first() {
+        let kind = if kind % 2 == 1 { FrameKind::Delta } else { FrameKind::Snapshot };
+        receive(&seal(kind, 0, 1, payload));
+    }
+}
+
+fn receive(frame: &[u8]) {
+    for start in [&Subscriber::new(None, LIMITS), &*HOLDING] {
+        let mut subscriber = start.clone();
+        match subscriber.receive(frame) {
+            Ok(Applied::Ignored(_)) | Err(_) => {
+                assert!(start.store() == subscriber.store());
+                assert_eq!((start.group(), start.epoch()), (subscriber.group(), subscriber.epoch()));
+            }
+            Ok(Applied::NewLayout | Applied::Changes(_)) => {
+                let store = subscriber.store().expect("it was applied");
+                let again = fingerprint(store);
+                let mut next = Subscriber::new(None, Limits { max_frame_bytes: 1 << 22, ..LIMITS });
+                assert_eq!(next.receive(&again), Ok(Applied::NewLayout));
+                assert_eq!(fingerprint(next.store().expect("it was applied")), again);
+            }
+        }
+    }
+}

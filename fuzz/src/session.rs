@@ -1,0 +1,124 @@
+//! Any list of calls on a publisher and its subscribers: they converge.
+
+use dapple_store::points::{Change, PointStore};
+use dapple_stream::{Applied, Frame, Limits, Publisher, PublisherConfig, Subscriber};
+
+use crate::input::{Input, fingerprint};
+
+/// Most calls of one run.
+const MAX_CALLS: usize = 200;
+
+/// One publisher, one subscriber that hears everything, two that hear what the bytes choose.
+struct Session {
+    publisher: Publisher,
+    store: PointStore,
+    live: Subscriber,
+    lossy: [Subscriber; 2],
+    sent: Vec<Frame>,
+}
+
+/// Reads `data` as a first store and a list of calls, makes them, and checks that whoever holds a state holds the
+/// right one, that damage is noticed, and that a join brings everyone up to date.
+pub fn session_ops(data: &[u8]) {
+    let mut input = Input(data);
+    let config = PublisherConfig {
+        first_group: u64::from(input.byte()),
+        deltas_per_group: u32::from(input.byte()) % 8,
+    };
+    let subscriber = Subscriber::new(Some([3; 32]), Limits::default());
+    let mut session = Session {
+        publisher: Publisher::new([3; 32], config),
+        store: input.store(),
+        live: subscriber.clone(),
+        lossy: [subscriber.clone(), subscriber],
+        sent: Vec::new(),
+    };
+    assert!(session.publisher.join().expect("nothing to compress").is_none());
+    session.publish();
+    for _ in 0..MAX_CALLS {
+        if input.is_empty() {
+            break;
+        }
+        session.call(&mut input);
+    }
+    for which in 0..2 {
+        session.rejoin(which);
+        for frame in &session.sent {
+            let applied = session.lossy[which].receive(&frame.bytes);
+            assert!(matches!(applied, Ok(Applied::Ignored(_))), "after a join, {applied:?}");
+        }
+    }
+}
+
+impl Session {
+    fn call(&mut self, input: &mut Input<'_>) {
+        match input.byte() % 8 {
+            0 | 1 => {
+                let points = self.store.visibility().len();
+                let changes: Vec<Change> = (0..if points > 0 { input.below(16) } else { 0 })
+                    .map(|_| Change { point: input.below(points) as u32, visibility: input.byte() })
+                    .collect();
+                self.store.apply(&changes).expect("the points exist");
+                self.publish();
+            }
+            2 => {
+                let frame = self.publisher.publish(&self.store).expect("memory suffices");
+                assert!(frame.is_none(), "a still scene sends nothing");
+            }
+            3 => {
+                self.store = input.store();
+                self.publish();
+            }
+            4 => {
+                let frame = self.publisher.start_group().expect("memory suffices");
+                self.send(frame);
+            }
+            5 => {
+                let which = input.below(2);
+                let frame = &self.sent[input.below(self.sent.len())];
+                // A gap is an error here, and no harm.
+                let _ = self.lossy[which].receive(&frame.bytes);
+            }
+            6 => {
+                let which = input.below(2);
+                let mut bytes = self.sent[input.below(self.sent.len())].bytes.to_vec();
+                let at = input.below(bytes.len());
+                bytes[at] ^= input.byte().max(1);
+                let before = self.lossy[which].store().cloned();
+                assert!(self.lossy[which].receive(&bytes).is_err(), "damage went unnoticed");
+                assert!(self.lossy[which].store() == before.as_ref());
+            }
+            _ => self.rejoin(input.below(2)),
+        }
+    }
+
+    fn publish(&mut self) {
+        let frame = self.publisher.publish(&self.store).expect("memory suffices");
+        self.send(frame);
+    }
+
+    fn send(&mut self, frame: Option<Frame>) {
+        if let Some(frame) = frame {
+            self.live.receive(&frame.bytes).expect("it hears everything");
+            assert_eq!((self.live.group(), self.live.epoch()), (Some(frame.group), Some(frame.epoch)));
+            self.sent.push(frame);
+        }
+        self.check(&self.live);
+    }
+
+    fn rejoin(&mut self, which: usize) {
+        let frame = self.publisher.join().expect("memory suffices").expect("something is published");
+        self.lossy[which].receive(&frame.bytes).expect("a snapshot is always welcome");
+        self.check(&self.lossy[which]);
+    }
+
+    /// `subscriber` is up to date.
+    fn check(&self, subscriber: &Subscriber) {
+        let held = subscriber.store().expect("it has a snapshot");
+        assert!(fingerprint(held) == fingerprint(&self.store), "the stores differ");
+        assert_eq!(
+            (subscriber.group(), subscriber.epoch()),
+            (self.publisher.group(), self.publisher.epoch())
+        );
+    }
+}
