@@ -130,13 +130,14 @@ impl Runner {
                 "--show-output",
             ]);
         }
-        let report = self.metadata.target_directory.join("nextest/default/junit.xml");
+        // In the workspace whatever the build folder is: `.config/nextest.toml` says so.
+        let report = self.root().join("target/nextest/default/junit.xml");
         // Only this run's report counts; that there is none yet is no error.
         let _ = std::fs::remove_file(&report);
         let outcome = self.cargo(&["nextest", "run", "--workspace", "--all-features"]);
         match std::fs::read_to_string(&report) {
             Ok(text) => self.skipped = skipped::skipped_lines(&text),
-            Err(error) => eprintln!("cannot list what was skipped: {report}: {error}"),
+            Err(error) => eprintln!("cannot list what was skipped: {}: {error}", report.display()),
         }
         outcome
     }

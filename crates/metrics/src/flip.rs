@@ -7,6 +7,8 @@
 //! rows are evaluated in parallel, each with as many rows beyond its own as the filters reach; the outcome is the
 //! same, bit for bit, as that of the whole picture at once. It is C++ in single precision, so the last digits may
 //! differ between processor families.
+//!
+//! [Andersson2020]: https://doi.org/10.1145/3406183
 
 use rayon::prelude::*;
 
@@ -89,7 +91,7 @@ fn flip_in_bands(
 
 /// How many rows the filters reach to either side.
 ///
-/// The widest of [Andersson2020]'s is the second Gaussian of the blue-yellow contrast sensitivity, of b = 0.04: its
+/// The widest of the paper's filters is the second Gaussian of the blue-yellow contrast sensitivity, of b = 0.04: its
 /// radius is 3 √(b / 2π²) = 0.1351 degrees; feature detection reaches 3 · 0.082 / 2 = 0.123 degrees. Both are
 /// rounded up to whole pixels; one more is for the rounding.
 fn filter_radius_rows(pixels_per_degree: f32) -> u32 {

@@ -13,6 +13,8 @@
 //! **Borders**: only windows that lie wholly inside the image count, so the outermost 5 pixels have no window
 //! of their own, and an image under 11 pixels in either direction is refused. There is no down-sampling
 //! beforehand.
+//!
+//! [Wang2004]: https://doi.org/10.1109/TIP.2003.819861
 
 use rayon::prelude::*;
 
@@ -83,7 +85,7 @@ fn row_sum(width: usize, reference: &[f32], test: &[f32], weights: &[f64; WINDOW
         .sum()
 }
 
-/// [Wang2004] Eq. 13 from the weighted means of x, y, x², y², xy.
+/// Eq. 13 from the weighted means of x, y, x², y², xy.
 fn similarity([mean_x, mean_y, mean_xx, mean_yy, mean_xy]: [f64; 5]) -> f64 {
     let variance_x = mean_xx - mean_x * mean_x;
     let variance_y = mean_yy - mean_y * mean_y;
