@@ -20,7 +20,9 @@ pub enum RenderError {
         samples_per_axis: u32,
     },
     /// The buffer does not fit into memory.
-    #[error("not enough memory for {samples} samples: draw a smaller picture or take fewer samples per pixel")]
+    #[error(
+        "not enough memory for {samples} samples: draw a smaller picture or take fewer samples per pixel"
+    )]
     Memory {
         /// Samples asked for.
         samples: u64,
@@ -32,7 +34,9 @@ pub enum RenderError {
         reason: &'static str,
     },
     /// Lists of the scene do not fit together, or the pose is of another scene.
-    #[error("the scene cannot be drawn: {reason}; pose the same scene that is drawn, and load it through its loader")]
+    #[error(
+        "the scene cannot be drawn: {reason}; pose the same scene that is drawn, and load it through its loader"
+    )]
     Scene {
         /// What does not fit, and where.
         reason: String,

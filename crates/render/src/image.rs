@@ -70,7 +70,7 @@ impl ToneMap {
     /// Display light 0 … 1 of a radiance; not a number becomes 0.
     pub fn map(&self, radiance: Vec3) -> Vec3 {
         let curve = |x: f32| {
-            let x = (x * self.exposure).max(0.0).min(1e6);
+            let x = if x.is_nan() { 0.0 } else { (x * self.exposure).clamp(0.0, 1e6) };
             match self.curve {
                 ToneCurve::Clamp => x.min(1.0),
                 ToneCurve::Reinhard => x / (1.0 + x),

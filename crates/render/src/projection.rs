@@ -43,11 +43,8 @@ pub(crate) fn orthographic(half_width: f64, half_height: f64, near: f64, far: f6
 /// The same affine map in double precision.
 pub(crate) fn widen(map: &Affine3A) -> DAffine3 {
     let linear: DMat3 = Mat3::from(map.matrix3).as_dmat3();
-    let translation = DVec3::new(
-        f64::from(map.translation.x),
-        f64::from(map.translation.y),
-        f64::from(map.translation.z),
-    );
+    let translation =
+        DVec3::new(f64::from(map.translation.x), f64::from(map.translation.y), f64::from(map.translation.z));
     DAffine3::from_mat3_translation(linear, translation)
 }
 

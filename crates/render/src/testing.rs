@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use dapple_scene::{
-    AlphaMode, Aabb, Filter, Image, Instance, Light, LightKind, Material, Mesh, Node, Part, Pose, PosedInstance,
-    PosedLight, Scene, Texture, TextureRef, Wrap,
+    Aabb, AlphaMode, Filter, Image, Instance, Light, LightKind, Material, Mesh, Node, Part, Pose,
+    PosedInstance, PosedLight, Scene, Texture, TextureRef, Wrap,
 };
 use glam::{Affine2, Affine3A, Mat3, Vec2, Vec3, Vec4};
 
@@ -153,14 +153,11 @@ pub(crate) fn cube() -> Mesh {
     for axis in 0..3 {
         for sign in [-1.0f32, 1.0] {
             let normal = Vec3::from_array(std::array::from_fn(|i| if i == axis { sign } else { 0.0 }));
-            let right = Vec3::from_array(std::array::from_fn(|i| if i == (axis + 1) % 3 { 1.0 } else { 0.0 }));
+            let right =
+                Vec3::from_array(std::array::from_fn(|i| if i == (axis + 1) % 3 { 1.0 } else { 0.0 }));
             let up = normal.cross(right);
-            let face = quad([
-                normal - right - up,
-                normal + right - up,
-                normal + right + up,
-                normal - right + up,
-            ]);
+            let face =
+                quad([normal - right - up, normal + right - up, normal + right + up, normal - right + up]);
             let first = mesh.positions.len() as u32;
             mesh.positions.extend(face.positions);
             mesh.normals.extend(face.normals);
@@ -199,7 +196,10 @@ pub(crate) fn check_golden(folder: &str, name: &str, picture: &Rgb8Image) {
     };
     assert_eq!(golden.dimensions(), (picture.width, picture.height), "size of golden {name}");
     let differing = golden.pixels().zip(&picture.pixels).filter(|(g, p)| g.0 != **p).count();
-    assert_eq!(differing, 0, "{differing} pixels differ from golden {name}; renew with DAPPLE_BLESS=1 if meant");
+    assert_eq!(
+        differing, 0,
+        "{differing} pixels differ from golden {name}; renew with DAPPLE_BLESS=1 if meant"
+    );
 }
 
 /// Writes a picture, for goldens and for looking at.
@@ -210,11 +210,12 @@ pub(crate) fn write_png(path: &std::path::Path, picture: &Rgb8Image) {
 
 /// A checkerboard of `n × n` texels in two colours.
 pub(crate) fn checkerboard(n: u32, a: [u8; 4], b: [u8; 4]) -> Vec<[u8; 4]> {
-    (0..n * n).map(|i| if (i % n + i / n) % 2 == 0 { a } else { b }).collect()
+    (0..n * n).map(|i| if (i % n + i / n).is_multiple_of(2) { a } else { b }).collect()
 }
 
 /// White vertex colours would be invisible: a ramp from black to white along x.
 pub(crate) fn color_ramp(mesh: &mut Mesh) {
-    mesh.colors = mesh.positions.iter().map(|p| Vec3::splat(0.5 + 0.5 * p.x.clamp(-1.0, 1.0)).extend(1.0)).collect();
+    mesh.colors =
+        mesh.positions.iter().map(|p| Vec3::splat(0.5 + 0.5 * p.x.clamp(-1.0, 1.0)).extend(1.0)).collect();
     debug_assert!(mesh.colors.iter().all(|c: &Vec4| c.is_finite()));
 }

@@ -122,8 +122,7 @@ mod tests {
             height: 1,
             rgba8: vec![[0, 0, 0, 255], [255, 255, 255, 255]],
         };
-        let texture =
-            Texture { image: 0, wrap_u: Wrap::Repeat, wrap_v: Wrap::Clamp, filter: Filter::Linear };
+        let texture = Texture { image: 0, wrap_u: Wrap::Repeat, wrap_v: Wrap::Clamp, filter: Filter::Linear };
         (texture, image)
     }
 

@@ -92,7 +92,10 @@ impl GBuffer {
 
     /// Reduces the samples of each pixel to one value, in parallel; pixels row-major from the top. `reduce` gets the
     /// indices of the pixel's samples row by row.
-    pub fn map_pixels<T: Send>(&self, reduce: impl Fn(&mut dyn Iterator<Item = usize>) -> T + Sync) -> Vec<T> {
+    pub fn map_pixels<T: Send>(
+        &self,
+        reduce: impl Fn(&mut dyn Iterator<Item = usize>) -> T + Sync,
+    ) -> Vec<T> {
         let n = self.samples_per_axis as usize;
         let row = self.width_samples() as usize;
         let pixels = self.width as usize * self.height as usize;
@@ -204,7 +207,14 @@ impl<'a> AlphaTest<'a> {
         };
         let mesh = &scene.meshes[scene.instances[triangle.instance as usize].mesh as usize];
         let clip = view.clip_triangle(scene, pose, triangle.instance as usize, triangle.index as usize)?;
-        Some(AlphaTest { scene, material, mesh, indices: mesh.triangles[triangle.index as usize], clip, cutoff })
+        Some(AlphaTest {
+            scene,
+            material,
+            mesh,
+            indices: mesh.triangles[triangle.index as usize],
+            clip,
+            cutoff,
+        })
     }
 
     /// Whether the surface is there at a place of the picture.

@@ -33,7 +33,14 @@ pub(crate) trait Sink: Sync {
     /// Before the samples of a triangle.
     fn begin(&self, triangle: &Triangle) -> Self::State;
     /// A covered sample at column, row `at`. Calls come in any order: keep what does not depend on it.
-    fn sample(&self, state: &Self::State, triangle: &Triangle, at: [u32; 2], depth: f32, pixel: &mut Self::Pixel);
+    fn sample(
+        &self,
+        state: &Self::State,
+        triangle: &Triangle,
+        at: [u32; 2],
+        depth: f32,
+        pixel: &mut Self::Pixel,
+    );
 }
 
 /// A triangle on the sample grid: a whole one of a mesh, or what clipping left of it.
@@ -170,15 +177,19 @@ pub(crate) fn draw<S: Sink>(
                 (first, end, triangles)
             })
             .collect();
-        pixels.par_chunks_mut(view.columns as usize * band_rows as usize).enumerate().for_each(|(band, pixels)| {
-            let first_row = band as u32 * band_rows;
-            let end_row = (first_row + band_rows).min(view.rows);
-            for (_, _, triangles) in drawn.iter().filter(|d| d.0 < end_row && d.1 > first_row) {
-                for triangle in triangles.iter().filter(|t| t.first_row < end_row && t.end_row > first_row) {
-                    fill(view, triangle, first_row, end_row, sink, pixels);
+        pixels.par_chunks_mut(view.columns as usize * band_rows as usize).enumerate().for_each(
+            |(band, pixels)| {
+                let first_row = band as u32 * band_rows;
+                let end_row = (first_row + band_rows).min(view.rows);
+                for (_, _, triangles) in drawn.iter().filter(|d| d.0 < end_row && d.1 > first_row) {
+                    for triangle in
+                        triangles.iter().filter(|t| t.first_row < end_row && t.end_row > first_row)
+                    {
+                        fill(view, triangle, first_row, end_row, sink, pixels);
+                    }
                 }
-            }
-        });
+            },
+        );
     }
 }
 
@@ -195,7 +206,14 @@ fn split(scene: &Scene, pose: &Pose, cull: bool, include: impl Fn(usize) -> bool
             let end = part.first_triangle + part.triangle_count;
             for first in (part.first_triangle..end).step_by(CHUNK_TRIANGLES as usize) {
                 let end = end.min(first.saturating_add(CHUNK_TRIANGLES));
-                chunks.push(Chunk { instance: i as u32, material: part.material, first, end, cull, mirrored });
+                chunks.push(Chunk {
+                    instance: i as u32,
+                    material: part.material,
+                    first,
+                    end,
+                    cull,
+                    mirrored,
+                });
             }
         }
     }
@@ -244,7 +262,8 @@ fn set_up(view: &View, scene: &Scene, pose: &Pose, chunk: &Chunk, index: u32, ou
         }
         let span = |axis: usize, limit: u32| {
             let values = corners.map(|c| c[axis]);
-            let (min, max) = (values[0].min(values[1]).min(values[2]), values[0].max(values[1]).max(values[2]));
+            let (min, max) =
+                (values[0].min(values[1]).min(values[2]), values[0].max(values[1]).max(values[2]));
             centers_between(i64::from(min), i64::from(max), bits, limit)
         };
         let (first_column, end_column) = span(0, view.columns);
@@ -339,8 +358,7 @@ fn fill<S: Sink>(
         let start = (row - first_row) as usize * view.columns as usize;
         for column in first..=last {
             let column = column as u32;
-            let depth =
-                triangle.depth.depth(DVec2::new(f64::from(column) + 0.5, f64::from(row) + 0.5));
+            let depth = triangle.depth.depth(DVec2::new(f64::from(column) + 0.5, f64::from(row) + 0.5));
             sink.sample(&state, triangle, [column, row], depth, &mut pixels[start + column as usize]);
         }
     }

@@ -169,7 +169,8 @@ impl<'a> Found<'a> {
             linear.x_axis.cross(linear.y_axis),
         );
         let normal = (cofactor * blend(corners, self.weights) * mirror).try_normalize()?;
-        let mapped = self.mapped_normal(scene, material, linear, uv, corners_world, normal, deformed.is_some());
+        let mapped =
+            self.mapped_normal(scene, material, linear, uv, corners_world, normal, deformed.is_some());
         Some(mapped.unwrap_or(normal) * self.facing())
     }
 

@@ -6,16 +6,15 @@ use dapple_scene::{AlphaMode, DeformedMesh, Filter, Mesh, PosedCamera, Projectio
 use glam::{Affine3A, DMat4, DVec3, Vec3, Vec4};
 
 use super::*;
-use crate::testing::{Stage, checkerboard, cube, ground, matte, quad, sphere, turned, with_threads};
+use crate::image::{Rgb8Image, unorm8};
+use crate::testing::{
+    Stage, check_golden, checkerboard, cube, ground, matte, quad, sphere, turned, with_threads,
+};
 
 /// One world unit is one pixel; the picture's lower left corner is the origin, the camera looks along −Z.
 fn pixel_camera(width: u32, height: u32) -> PosedCamera {
     PosedCamera {
-        world_from_view: Affine3A::from_translation(Vec3::new(
-            0.5 * width as f32,
-            0.5 * height as f32,
-            10.0,
-        )),
+        world_from_view: Affine3A::from_translation(Vec3::new(0.5 * width as f32, 0.5 * height as f32, 10.0)),
         projection: Projection::Orthographic { half_height: 0.5 * height as f32, near: 0.1, far: 20.0 },
     }
 }
@@ -85,8 +84,7 @@ fn supersamples_lie_on_a_regular_grid() {
     let buffer = rasterize(&stage.scene, &stage.pose, &pixel_camera(8, 8), 8, 8, 4).unwrap();
     assert_eq!(buffer.samples().len(), 32 * 32);
     assert_eq!(buffer.sample_position_px(33), [0.375, 0.375]);
-    let covered =
-        buffer.map_pixels(|samples| samples.filter(|&i| buffer.samples()[i].is_covered()).count());
+    let covered = buffer.map_pixels(|samples| samples.filter(|&i| buffer.samples()[i].is_covered()).count());
     for (i, count) in covered.into_iter().enumerate() {
         assert_eq!(count, [16, 16, 16, 8, 0, 0, 0, 0][i % 8], "pixel {i}");
     }
@@ -495,4 +493,25 @@ fn the_projection_is_the_cameras() {
             assert!((back - distance).abs() < 1e-3 * distance, "{back} {distance}");
         }
     }
+}
+
+#[test]
+fn golden_barycentrics() {
+    let mut stage = Stage::new();
+    stage.scene.materials[0].double_sided = true;
+    stage.add(sphere(7, 9), 0, turned(0.6, Vec3::new(-0.7, 0.9, 0.0)));
+    stage.add(cube(), 0, turned(2.1, Vec3::new(1.2, 0.7, 0.4)) * Affine3A::from_scale(Vec3::splat(0.6)));
+    stage.add(ground(40.0), 0, Affine3A::IDENTITY);
+    let camera = look(Vec3::new(0.4, 1.6, 4.0), Vec3::new(0.0, 0.8, 0.0));
+    let buffer = rasterize(&stage.scene, &stage.pose, &camera, 96, 96, 1).unwrap();
+    let color = |s: &Sample| match s.is_covered() {
+        true => [
+            unorm8(s.barycentrics[0]),
+            unorm8(s.barycentrics[1]),
+            (60 * (s.instance + 1) + s.triangle % 16) as u8,
+        ],
+        false => [0; 3],
+    };
+    let picture = Rgb8Image { width: 96, height: 96, pixels: buffer.samples().iter().map(color).collect() };
+    check_golden("gbuffer", "barycentrics", &picture);
 }
