@@ -1,0 +1,82 @@
+//! The bounds that `dapple eval --smoke` asserts: not less similar, not more bytes.
+
+use anyhow::{Context, Result, bail};
+
+use super::results::{Results, Row};
+
+/// Bounds on the default setting. They hold with a little room on every machine, because results do not depend on it.
+struct Bound {
+    method: &'static str,
+    least_visibility_psnr_db: f64,
+    most_flip: f64,
+    most_kbit_per_s: f64,
+    most_snapshot_bytes_per_point: f64,
+}
+
+const BOUNDS: [Bound; 2] = [
+    Bound {
+        method: "psao",
+        least_visibility_psnr_db: 26.0,
+        most_flip: 0.05,
+        most_kbit_per_s: 1000.0,
+        most_snapshot_bytes_per_point: 6.0,
+    },
+    Bound {
+        method: "psao-hat",
+        least_visibility_psnr_db: 20.0,
+        most_flip: 0.08,
+        most_kbit_per_s: 1000.0,
+        most_snapshot_bytes_per_point: 6.0,
+    },
+];
+
+/// Moving least squares must beat the paper's kernel by this much, on the same points.
+const LEAST_GAIN_DB: f64 = 2.0;
+
+/// Fails with the list of all bounds that do not hold.
+pub(super) fn check(results: &Results) -> Result<()> {
+    let mut broken = Vec::new();
+    let mut check = |what: String, holds: bool| {
+        if !holds {
+            broken.push(what);
+        }
+    };
+    for bound in &BOUNDS {
+        let row = find(results, bound.method)?;
+        let visibility = visibility_psnr_db(row);
+        let (kbit, snapshot) = (row.kbit_per_s.unwrap_or(0.0), row.snapshot_bytes.unwrap_or(0) as f64);
+        let per_point = snapshot / row.points.unwrap_or(1).max(1) as f64;
+        let method = bound.method;
+        check(
+            format!("{method}: visibility PSNR {visibility:.2} dB, at least {}", bound.least_visibility_psnr_db),
+            visibility >= bound.least_visibility_psnr_db,
+        );
+        check(format!("{method}: FLIP {:.4}, at most {}", row.flip, bound.most_flip), row.flip <= bound.most_flip);
+        check(
+            format!("{method}: {kbit:.1} kbit/s, more than 0 and at most {}", bound.most_kbit_per_s),
+            kbit > 0.0 && kbit <= bound.most_kbit_per_s,
+        );
+        check(
+            format!(
+                "{method}: snapshot of {per_point:.2} bytes a point, at most {}",
+                bound.most_snapshot_bytes_per_point
+            ),
+            per_point <= bound.most_snapshot_bytes_per_point,
+        );
+    }
+    let gain = visibility_psnr_db(find(results, "psao")?) - visibility_psnr_db(find(results, "psao-hat")?);
+    check(format!("psao gains {gain:.2} dB over psao-hat, at least {LEAST_GAIN_DB}"), gain >= LEAST_GAIN_DB);
+    if !broken.is_empty() {
+        bail!("the smoke evaluation left its bounds:\n  {}", broken.join("\n  "));
+    }
+    Ok(())
+}
+
+fn find<'a>(results: &'a Results, method: &str) -> Result<&'a Row> {
+    results.rows.iter().find(|r| r.method == method).with_context(|| format!("no row for {method}"))
+}
+
+/// Equal pictures have no finite PSNR.
+fn visibility_psnr_db(row: &Row) -> f64 {
+    row.visibility_psnr_db.unwrap_or(f64::INFINITY)
+}

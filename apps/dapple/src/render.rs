@@ -1,0 +1,141 @@
+//! `dapple render`: one picture.
+
+use anyhow::{Result, bail};
+use dapple_client::{Client, Drawn, PictureParams, draw};
+use dapple_render::compose::{ErrorKind, NormalSpace, PointsView, draw_points, resolve_plane, view_error};
+use dapple_render::compose::{view_normals, view_visibility};
+use dapple_render::image::{Rgb8Image, ToneMap};
+use dapple_render::psao::{Hat, Kernel};
+use dapple_scene::PosedCamera;
+use dapple_server::{Progress, Server, ServerConfig};
+use dapple_stream::Limits;
+use dapple_trace::Tracer;
+use dapple_trace::psao::generate::GenerateParams;
+use dapple_trace::psao::update::UpdateParams;
+use dapple_trace::rtao::{RtaoParams, trace_visibility_with_progress};
+
+use crate::args::{RenderArgs, RenderMethod, View};
+use crate::picture::{sites, write_png};
+use crate::progress::Bar;
+use crate::source::{self, Loaded};
+
+/// Renders what the arguments ask for and writes it.
+pub(crate) fn run(args: &RenderArgs) -> Result<()> {
+    check(args)?;
+    let loaded = source::load(&args.scene, None)?;
+    let scene = &loaded.scene;
+    let camera = source::find_camera(scene, args.camera.as_deref(), args.time)?;
+    let params = PictureParams {
+        width: args.size.width,
+        height: args.size.height,
+        supersample: args.supersample,
+        shade: Default::default(),
+    };
+    let drawn = draw(scene, &camera, args.time, &params)?;
+    let picture = match args.view {
+        View::Normal => view_normals(&drawn.gbuffer, scene, &drawn.pose, NormalSpace::World),
+        View::Points => points_view(args, &loaded, &drawn, &camera)?,
+        View::Beauty => {
+            let visibility = visibility(args, args.method, &loaded, &drawn)?;
+            drawn.compose(visibility.as_deref())?.to_rgb8(&ToneMap::default())
+        }
+        View::Visibility => {
+            let visibility = visibility(args, args.method, &loaded, &drawn)?;
+            view_visibility(&drawn.gbuffer, &visibility.unwrap_or_else(|| open(&drawn)))?
+        }
+        View::Error => {
+            let truth = visibility(args, RenderMethod::Rtao, &loaded, &drawn)?.unwrap_or_else(|| open(&drawn));
+            let test = visibility(args, args.method, &loaded, &drawn)?.unwrap_or_else(|| open(&drawn));
+            let truth = resolve_plane(&drawn.gbuffer, &truth, 1.0)?;
+            let test = resolve_plane(&drawn.gbuffer, &test, 1.0)?;
+            view_error(&truth.values, &test.values, &truth.coverage, ErrorKind::Signed)?
+        }
+    };
+    let Rgb8Image { width, height, pixels } = &picture;
+    write_png(&args.output, *width, *height, pixels)?;
+    println!("wrote {}", args.output.display());
+    Ok(())
+}
+
+fn check(args: &RenderArgs) -> Result<()> {
+    if !(1..=65536).contains(&args.rays) {
+        bail!("--rays is {}, must be 1 to 65536", args.rays);
+    }
+    if !args.time.is_finite() {
+        bail!("--time must be a finite number of seconds");
+    }
+    if args.view == View::Error && args.method == RenderMethod::Rtao {
+        bail!("--view error compares a method with rtao: choose --method psao, psao-hat or none");
+    }
+    Ok(())
+}
+
+fn open(drawn: &Drawn) -> Vec<f32> {
+    vec![1.0; drawn.gbuffer.samples().len()]
+}
+
+/// One visibility a sample; `None` for no occlusion.
+fn visibility(args: &RenderArgs, method: RenderMethod, loaded: &Loaded, drawn: &Drawn) -> Result<Option<Vec<f32>>> {
+    let kernel = match method {
+        RenderMethod::None => return Ok(None),
+        RenderMethod::Rtao => return Ok(Some(traced(args, loaded, drawn))),
+        RenderMethod::Psao => Kernel::default(),
+        RenderMethod::PsaoHat => Kernel::Hat(Hat::default()),
+    };
+    let (_, client) = light(args, loaded)?;
+    Ok(Some(client.visibility(drawn, &kernel)))
+}
+
+fn traced(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn) -> Vec<f32> {
+    let (radius_m, _) = source::resolve_radius(&loaded.scene, &args.visibility);
+    let tracer = Tracer::new(&loaded.scene, &drawn.pose);
+    let (indices, sites) = sites(&loaded.scene, drawn);
+    let rays = args.rays.div_ceil(args.supersample * args.supersample);
+    let params = RtaoParams { rays, radius_m, seed: u64::from(args.visibility.seed) };
+    let mut traced = vec![1.0; sites.len()];
+    let bar = Bar::new("rays", sites.len() as u64);
+    trace_visibility_with_progress(&tracer, &sites, &params, &mut traced, &|done| bar.set(done));
+    let mut visibility = open(drawn);
+    for (index, value) in indices.into_iter().zip(traced) {
+        visibility[index] = value;
+    }
+    visibility
+}
+
+/// A server brought to the picture's time, and a client that has joined it.
+fn light(args: &RenderArgs, loaded: &Loaded) -> Result<(Server, Client)> {
+    let scene = &loaded.scene;
+    let (radius_m, density_factor) = source::resolve_radius(scene, &args.visibility);
+    let config = ServerConfig {
+        generate: GenerateParams {
+            points_per_m2: args.points * density_factor,
+            seed: args.visibility.seed,
+            ..GenerateParams::default()
+        },
+        update: UpdateParams { rays: args.visibility.point_rays, radius_m, threshold: args.visibility.threshold },
+        ..ServerConfig::default()
+    };
+    let bar = Bar::new("points", 1000);
+    let mut server = Server::new(scene.clone(), &config, &|progress| match progress {
+        Progress::Laying(done, of) => bar.set((done * 400 / of.max(1)) as u64),
+        Progress::Tracing(done, of) => bar.set((400 + done * 600 / of.max(1)) as u64),
+    })?;
+    server.step(args.time)?;
+    let mut client = Client::new(scene.clone(), Limits::default());
+    if let Some(frame) = server.join()? {
+        client.receive(&frame.bytes)?;
+    }
+    Ok((server, client))
+}
+
+fn points_view(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn, camera: &PosedCamera) -> Result<Rgb8Image> {
+    if !matches!(args.method, RenderMethod::Psao | RenderMethod::PsaoHat) {
+        bail!("--view points shows the points of --method psao or psao-hat");
+    }
+    let (server, _) = light(args, loaded)?;
+    let placed = server.positions_world(&drawn.pose).into_iter().zip(server.store().visibility());
+    let (positions, values): (Vec<_>, Vec<f32>) =
+        placed.filter_map(|(position, &value)| Some((position?, f32::from(value) / 255.0))).unzip();
+    let picture = drawn.compose(None)?.to_rgb8(&ToneMap::default());
+    Ok(draw_points(&picture, &drawn.gbuffer, camera, &positions, &values, &PointsView::default())?)
+}
