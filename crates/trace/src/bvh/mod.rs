@@ -5,10 +5,10 @@
 //! - **Upper level**: a small tree over the instances' boxes in the world, built anew each update.
 //!
 //! Trees are eight wide with boxes side by side in arrays, built by a binned surface-area heuristic. Triangles are
-//! tested by the watertight algorithm of [Woop2013]: rays do not slip through shared edges or corners of one mesh.
+//! tested by the watertight algorithm of \[Woop2013\]: rays do not slip through shared edges or corners of one mesh.
 //! Both faces block. Results do not depend on the number of threads.
 //!
-//! [Woop2013]: S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2 (1), 2013.
+//! \[Woop2013\]: S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2 (1), 2013.
 
 mod alpha;
 mod build;

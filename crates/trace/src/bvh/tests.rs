@@ -146,6 +146,28 @@ fn a_surface_does_not_block_its_own_rays() {
 }
 
 #[test]
+fn distance_from_the_origin_costs_no_digits() {
+    // 1 km away, where steps of 2^-10 m are exact, hits are to the bit those at the origin.
+    let m = sphere(Vec3::ZERO, 1.0, 20, 30);
+    let rotation = Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 1.1);
+    let far = Vec3::new(1000.0, 300.0, -800.0);
+    let tracer_at = |translation| {
+        let map = Affine3A::from_scale_rotation_translation(Vec3::new(-1.0, 0.6, 1.4), rotation, translation);
+        let (scene, pose) = scene(vec![m.clone()], &[(0, map)]);
+        Tracer::new(&scene, &pose)
+    };
+    let (here, there) = (tracer_at(Vec3::ZERO), tracer_at(far));
+    let mut random = Random(2);
+    for _ in 0..500 {
+        let origin = (0.3 * random.vector() * 1024.0).floor() / 1024.0;
+        let ray = Ray { origin_world: origin, direction_world: random.direction(), t_max: 5.0 };
+        let hit = here.closest_hit(&ray);
+        assert!(hit.is_some());
+        assert_eq!(hit, there.closest_hit(&Ray { origin_world: far + origin, ..ray }));
+    }
+}
+
+#[test]
 fn nothing_to_hit() {
     let directions = [Vec3::X, Vec3::Y, Vec3::ZERO, Vec3::NAN];
     let flat = Affine3A::from_scale(Vec3::new(1.0, 0.0, 1.0));

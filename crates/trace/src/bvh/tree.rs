@@ -9,7 +9,7 @@ pub(crate) const WIDTH: usize = 8;
 pub(crate) const MAX_LEAF: usize = 4;
 
 /// Boxes grow by this factor of the distance along the ray, which covers the rounding of the box test and of the
-/// triangle test ([Ize2013] derives 1 + 2 gamma(3) for the former).
+/// triangle test (\[Ize2013\] derives 1 + 2 gamma(3) for the former).
 pub(crate) const CONSERVATIVE: f32 = 1.0 + 1.0 / (1 << 20) as f32;
 
 const INNER: u8 = 0;

@@ -1,4 +1,4 @@
-//! The watertight ray–triangle test of [Woop2013], for one ray and for lanes of rays that share an origin.
+//! The watertight ray–triangle test of \[Woop2013\], for one ray and for lanes of rays that share an origin.
 //!
 //! A ray is sheared so that it runs along one axis from the origin; a triangle is hit where its three 2D edge
 //! functions agree in sign. Products of `f32` round monotonically, so a computed sign is never wrong, at worst
@@ -26,7 +26,7 @@ pub(crate) struct MeshRay {
     pub(crate) inverse: [f32; 3],
     /// Axes: the two across and the one along the shear.
     pub(crate) axes: [usize; 3],
-    /// Shear across, across, and scale along ([Woop2013] Sx, Sy, Sz).
+    /// Shear across, across, and scale along (\[Woop2013\] Sx, Sy, Sz).
     pub(crate) shear: [f32; 3],
     /// Farthest hit.
     pub(crate) t_max: f32,

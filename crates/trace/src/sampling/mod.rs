@@ -1,9 +1,9 @@
 //! Directions that depend on nothing but a seed, a site and a sample.
 //!
-//! [`fixed_pattern`] is a scrambled (0,2)-sequence ([Sobol1967] in two dimensions) with nested uniform scrambling by
-//! a hash ([Owen1995], [Burley2020]), mapped to the hemisphere so that directions have cosine density.
+//! [`fixed_pattern`] is a scrambled (0,2)-sequence (\[Sobol1967\] in two dimensions) with nested uniform scrambling by
+//! a hash (\[Owen1995\], \[Burley2020\]), mapped to the hemisphere so that directions have cosine density.
 //!
-//! [Burley2020]: B. Burley, "Practical Hash-based Owen Scrambling", JCGT 9 (4), 2020.
+//! \[Burley2020\]: B. Burley, "Practical Hash-based Owen Scrambling", JCGT 9 (4), 2020.
 
 use dapple_scene::glam::Vec3;
 
@@ -54,7 +54,7 @@ fn sin_cos_turns(turns: f32) -> (f32, f32) {
 
 /// Unit tangent and bitangent of a unit normal, so that `(tangent, bitangent, normal)` is right-handed.
 ///
-/// Branchless [Duff2017] ("Building an Orthonormal Basis, Revisited", JCGT 6 (1), 2017); jumps only across the plane
+/// Branchless \[Duff2017\] ("Building an Orthonormal Basis, Revisited", JCGT 6 (1), 2017); jumps only across the plane
 /// z = 0.
 pub fn orthonormal_basis(normal: Vec3) -> (Vec3, Vec3) {
     let sign = 1.0_f32.copysign(normal.z);
@@ -95,7 +95,7 @@ fn sobol(i: u32) -> [u32; 2] {
     [i, y]
 }
 
-/// Nested uniform scrambling of a number whose bits are reversed ([Burley2020], the permutation of Laine and Karras):
+/// Nested uniform scrambling of a number whose bits are reversed (\[Burley2020\], the permutation of Laine and Karras):
 /// each bit is flipped or not by a hash of the bits of more weight. Returns the bits in their usual order.
 fn scramble(reversed: u32, seed: u32) -> u32 {
     let mut x = reversed.wrapping_add(seed);
