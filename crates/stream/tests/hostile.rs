@@ -160,6 +160,20 @@ fn rules_of_the_format_are_enforced() {
     bad[0..4].copy_from_slice(&f32::NAN.to_le_bytes());
     assert!(reason(snapshot(bad, &[2, 0])).contains("quantum_m is NaN"));
 
+    // With 5 local bits a cell has 48 bits: the last one there is, and the first beyond.
+    let with_cell = |cell: [u8; 7]| {
+        let mut out = layout(53, 0, 0)[..24].to_vec();
+        out[8] = 5;
+        out.extend([2, 0, 2, 0, 14]);
+        out.extend(cell);
+        out.extend([2, 0, 2, 0, 2, 0]);
+        out
+    };
+    let last = [0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x3f];
+    assert_eq!(snapshot(with_cell(last), &[2, 0]), Ok(Applied::NewLayout));
+    let beyond = [0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x40];
+    assert!(reason(snapshot(with_cell(beyond), &[2, 0])).contains("leave the 21-bit grid"));
+
     let delta = |payload: &[u8]| holding().receive(&seal(FrameKind::Delta, 0, 12, payload));
     assert!(matches!(delta(&[2, 1, 2, 5, 2, 9]), Ok(Applied::Changes(list)) if list.len() == 1));
     assert!(reason(delta(&[0, 1, 2, 5, 2, 9])).contains("is the frame's own"));
