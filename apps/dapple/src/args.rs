@@ -243,7 +243,9 @@ impl FromStr for Method {
             "rtao" => Ok(Method::Rtao { rays: 16 }),
             _ => match s.strip_prefix("rtao-").and_then(|r| r.parse().ok()) {
                 Some(rays @ 1..=65536) => Ok(Method::Rtao { rays }),
-                _ => Err("known methods: psao, psao-hat, rtao-R with R from 1 to 65536 (rtao-16), none".into()),
+                _ => {
+                    Err("known methods: psao, psao-hat, rtao-R with R from 1 to 65536 (rtao-16), none".into())
+                }
             },
         }
     }
@@ -353,7 +355,14 @@ mod tests {
         for text in ["eye=1,-2.5,3e1,target=0,0,0,fov=45", "fov=45,target=0,0,0,eye=1,-2.5,30"] {
             assert_eq!(text.parse(), Ok(expected), "{text}");
         }
-        for text in ["", "eye=1,2,target=0,0,0", "eye=0,0,0,target=0,0,0", "eye=1,2,3", "eye=a,b,c,target=0,0,0", "fov=190"] {
+        for text in [
+            "",
+            "eye=1,2,target=0,0,0",
+            "eye=0,0,0,target=0,0,0",
+            "eye=1,2,3",
+            "eye=a,b,c,target=0,0,0",
+            "fov=190",
+        ] {
             assert!(text.parse::<CameraText>().is_err(), "{text}");
         }
     }

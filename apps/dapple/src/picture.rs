@@ -14,7 +14,8 @@ use dapple_trace::rtao::Site;
 /// Writes a whole file: into a neighbour first, then renamed over the old one.
 pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
     if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-        std::fs::create_dir_all(folder).with_context(|| format!("cannot create the folder {}", folder.display()))?;
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("cannot create the folder {}", folder.display()))?;
     }
     let name = path.file_name().with_context(|| format!("{} names no file", path.display()))?;
     let mut partial = name.to_owned();
@@ -35,8 +36,14 @@ pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
 pub(crate) fn write_png(path: &Path, width: u32, height: u32, rgb8: &[[u8; 3]]) -> Result<()> {
     let mut bytes = Vec::new();
     let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
-    image::ImageEncoder::write_image(encoder, rgb8.as_flattened(), width, height, image::ExtendedColorType::Rgb8)
-        .with_context(|| format!("cannot encode {}", path.display()))?;
+    image::ImageEncoder::write_image(
+        encoder,
+        rgb8.as_flattened(),
+        width,
+        height,
+        image::ExtendedColorType::Rgb8,
+    )
+    .with_context(|| format!("cannot encode {}", path.display()))?;
     write_file(path, &bytes)
 }
 
@@ -86,7 +93,8 @@ impl Shown {
 
     /// Writes `STEM-beauty.png` and `STEM-visibility.png`.
     pub(crate) fn write(&self, folder: &Path, stem: &str) -> Result<Files> {
-        let files = Files { beauty: format!("{stem}-beauty.png"), visibility: format!("{stem}-visibility.png") };
+        let files =
+            Files { beauty: format!("{stem}-beauty.png"), visibility: format!("{stem}-visibility.png") };
         write_png(&folder.join(&files.beauty), self.width, self.height, &self.beauty)?;
         write_png(&folder.join(&files.visibility), self.width, self.height, &self.visibility_picture)?;
         Ok(files)
@@ -133,7 +141,8 @@ impl Compared {
 
 /// Rec. 709 luma of sRGB-encoded pixels, 0 … 1.
 fn luma(rgb8: &[[u8; 3]]) -> Vec<f32> {
-    let luma_of = |&[r, g, b]: &[u8; 3]| 0.2126 * f32::from(r) + 0.7152 * f32::from(g) + 0.0722 * f32::from(b);
+    let luma_of =
+        |&[r, g, b]: &[u8; 3]| 0.2126 * f32::from(r) + 0.7152 * f32::from(g) + 0.0722 * f32::from(b);
     rgb8.iter().map(|p| luma_of(p) / 255.0).collect()
 }
 

@@ -44,7 +44,8 @@ pub(crate) fn run(args: &RenderArgs) -> Result<()> {
             view_visibility(&drawn.gbuffer, &visibility.unwrap_or_else(|| open(&drawn)))?
         }
         View::Error => {
-            let truth = visibility(args, RenderMethod::Rtao, &loaded, &drawn)?.unwrap_or_else(|| open(&drawn));
+            let truth =
+                visibility(args, RenderMethod::Rtao, &loaded, &drawn)?.unwrap_or_else(|| open(&drawn));
             let test = visibility(args, args.method, &loaded, &drawn)?.unwrap_or_else(|| open(&drawn));
             let truth = resolve_plane(&drawn.gbuffer, &truth, 1.0)?;
             let test = resolve_plane(&drawn.gbuffer, &test, 1.0)?;
@@ -75,7 +76,12 @@ fn open(drawn: &Drawn) -> Vec<f32> {
 }
 
 /// One visibility a sample; `None` for no occlusion.
-fn visibility(args: &RenderArgs, method: RenderMethod, loaded: &Loaded, drawn: &Drawn) -> Result<Option<Vec<f32>>> {
+fn visibility(
+    args: &RenderArgs,
+    method: RenderMethod,
+    loaded: &Loaded,
+    drawn: &Drawn,
+) -> Result<Option<Vec<f32>>> {
     let kernel = match method {
         RenderMethod::None => return Ok(None),
         RenderMethod::Rtao => return Ok(Some(traced(args, loaded, drawn))),
@@ -112,7 +118,11 @@ fn light(args: &RenderArgs, loaded: &Loaded) -> Result<(Server, Client)> {
             seed: args.visibility.seed,
             ..GenerateParams::default()
         },
-        update: UpdateParams { rays: args.visibility.point_rays, radius_m, threshold: args.visibility.threshold },
+        update: UpdateParams {
+            rays: args.visibility.point_rays,
+            radius_m,
+            threshold: args.visibility.threshold,
+        },
         ..ServerConfig::default()
     };
     let bar = Bar::new("points", 1000);

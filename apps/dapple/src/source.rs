@@ -80,7 +80,11 @@ pub(crate) fn find_path(scene: &Scene, wanted: Option<&str>) -> Result<CameraPat
 }
 
 /// A camera given as text or by the name of one of the scene's camera paths.
-pub(crate) fn find_camera(scene: &Scene, text: Option<&str>, time_s: f64) -> Result<dapple_scene::PosedCamera> {
+pub(crate) fn find_camera(
+    scene: &Scene,
+    text: Option<&str>,
+    time_s: f64,
+) -> Result<dapple_scene::PosedCamera> {
     if let Some(text) = text.filter(|t| t.contains('=')) {
         let camera: CameraText = text.parse().map_err(anyhow::Error::msg)?;
         return Ok(dapple_scene::PosedCamera::look_at(
@@ -89,9 +93,8 @@ pub(crate) fn find_camera(scene: &Scene, text: Option<&str>, time_s: f64) -> Res
             camera.fov_degrees.to_radians(),
         ));
     }
-    let path = find_path(scene, text).context(
-        "--camera takes a camera path's name or eye=X,Y,Z,target=X,Y,Z,fov=DEGREES",
-    )?;
+    let path = find_path(scene, text)
+        .context("--camera takes a camera path's name or eye=X,Y,Z,target=X,Y,Z,fov=DEGREES")?;
     Ok(path.camera(scene, &scene.pose(time_s)))
 }
 

@@ -81,7 +81,12 @@ impl Client {
     }
 
     /// Draws the scene at `now_s` (seconds) without visibility.
-    pub fn draw(&self, camera: &PosedCamera, now_s: f64, params: &PictureParams) -> Result<Drawn, RenderError> {
+    pub fn draw(
+        &self,
+        camera: &PosedCamera,
+        now_s: f64,
+        params: &PictureParams,
+    ) -> Result<Drawn, RenderError> {
         draw(&self.scene, camera, now_s, params)
     }
 

@@ -150,8 +150,10 @@ impl Texture {
                 let (x0, y0) = (x.floor(), y.floor());
                 let (fx, fy) = (x - x0, y - y0);
                 let (x0, y0) = (x0 as i64, y0 as i64);
-                let top = self.texel(image, x0, y0).lerp(self.texel(image, x0 + 1, y0), fx);
-                let bottom = self.texel(image, x0, y0 + 1).lerp(self.texel(image, x0 + 1, y0 + 1), fx);
+                let top = self.texel(image, x0, y0).lerp(self.texel(image, x0.saturating_add(1), y0), fx);
+                let bottom = self
+                    .texel(image, x0, y0.saturating_add(1))
+                    .lerp(self.texel(image, x0.saturating_add(1), y0.saturating_add(1)), fx);
                 top.lerp(bottom, fy)
             }
         }

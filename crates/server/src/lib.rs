@@ -67,8 +67,6 @@ pub struct Server {
     tracer: Tracer,
     updater: Updater,
     publisher: Publisher,
-    /// Number of the last update.
-    epoch: u64,
     dropped_inside: u32,
 }
 
@@ -100,8 +98,8 @@ impl Server {
         let tracing = |done| progress(Progress::Tracing(done, count));
         let updater = Updater::new(&scene, &pose, &tracer, points, config.update, &tracing)?;
         let mut publisher = Publisher::new(scene.hash().0, config.publish);
-        publisher.publish(0, updater.store())?;
-        Ok(Server { scene, tracer, updater, publisher, epoch: 0, dropped_inside })
+        publisher.publish(updater.store())?;
+        Ok(Server { scene, tracer, updater, publisher, dropped_inside })
     }
 
     /// Brings the scene to `now_s` (seconds) and publishes what changed. Time may run in any direction.
@@ -109,8 +107,7 @@ impl Server {
         let pose = self.scene.pose(now_s);
         self.tracer.update(&self.scene, &pose);
         let report = self.updater.step(&self.scene, &pose, &self.tracer);
-        self.epoch += 1;
-        let frame = self.publisher.publish(self.epoch, self.updater.store())?;
+        let frame = self.publisher.publish(self.updater.store())?;
         Ok(StepReport {
             frame,
             traced: report.traced,

@@ -29,11 +29,9 @@ pub(super) fn html(results: &Results) -> String {
 
 fn summary(page: &mut String, results: &Results) {
     let run = &results.run;
-    let best = results
-        .rows
-        .iter()
-        .filter(|r| r.kbit_per_s.is_some())
-        .max_by(|a, b| a.visibility_psnr_db.unwrap_or(f64::MAX).total_cmp(&b.visibility_psnr_db.unwrap_or(f64::MAX)));
+    let best = results.rows.iter().filter(|r| r.kbit_per_s.is_some()).max_by(|a, b| {
+        a.visibility_psnr_db.unwrap_or(f64::MAX).total_cmp(&b.visibility_psnr_db.unwrap_or(f64::MAX))
+    });
     if let Some(row) = best {
         let _ = writeln!(
             page,
@@ -82,10 +80,12 @@ fn numbers(page: &mut String, results: &Results) {
 fn frame(page: &mut String, results: &Results, number: usize, time_s: f64) {
     let _ = writeln!(page, "<h2>Picture {} at {time_s:.2} s</h2>\n<div class=\"pictures\">", number + 1);
     let stem = format!("{number:03}-truth");
-    card(page, "truth", &format!("{} rays a pixel", results.run.reference_rays), &[
-        ("picture", &format!("{stem}-beauty.png")),
-        ("visibility", &format!("{stem}-visibility.png")),
-    ]);
+    card(
+        page,
+        "truth",
+        &format!("{} rays a pixel", results.run.reference_rays),
+        &[("picture", &format!("{stem}-beauty.png")), ("visibility", &format!("{stem}-visibility.png"))],
+    );
     for row in &results.rows {
         let Some(frame) = row.frames.get(number) else { continue };
         let psnr = frame.visibility_psnr_db.map_or("equal".to_owned(), |v| format!("{v:.2} dB"));
@@ -95,11 +95,16 @@ fn frame(page: &mut String, results: &Results, number: usize, time_s: f64) {
         };
         let FrameRow { beauty, visibility, error, .. } = frame;
         let caption = format!("visibility {psnr}, FLIP {:.4}", frame.flip);
-        card(page, &name, &caption, &[
-            ("picture", beauty),
-            ("visibility", visibility),
-            ("error of visibility: blue too dark, red too bright, full color at 0.25", error),
-        ]);
+        card(
+            page,
+            &name,
+            &caption,
+            &[
+                ("picture", beauty),
+                ("visibility", visibility),
+                ("error of visibility: blue too dark, red too bright, full color at 0.25", error),
+            ],
+        );
     }
     page.push_str("</div>\n");
 }
@@ -125,7 +130,10 @@ fn facts(page: &mut String, results: &Results) {
         ("scene", format!("{}, {} triangles, {} instances", scene.name, scene.triangles, scene.instances)),
         ("scene hash", scene.hash.clone()),
         ("seed", run.seed.to_string()),
-        ("program", format!("dapple {}, commit {}", run.dapple_version, run.commit.as_deref().unwrap_or("unknown"))),
+        (
+            "program",
+            format!("dapple {}, commit {}", run.dapple_version, run.commit.as_deref().unwrap_or("unknown")),
+        ),
         ("machine", format!("{}, {} threads, {}", machine.cpu, machine.threads, machine.os)),
     ];
     page.push_str("<h2>How this was made</h2>\n<dl>\n");

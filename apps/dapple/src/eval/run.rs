@@ -101,7 +101,9 @@ pub(super) fn evaluate(loaded: &Loaded, settings: &Settings, out: &Path) -> Resu
         let truth = trace_samples(loaded, &tracer, &drawn, truth_rays, settings, 0, &traced);
         let truth = Shown::new(&drawn, Some(&truth))?;
         if truth.covered_pixels == 0 {
-            tracing::warn!("frame {number} at {time_s:.3} s shows no geometry: its visibility is not compared");
+            tracing::warn!(
+                "frame {number} at {time_s:.3} s shows no geometry: its visibility is not compared"
+            );
         }
         truth.write(out, &format!("{number:03}-truth"))?;
         for (index, line) in lines.iter_mut().enumerate() {
@@ -164,15 +166,22 @@ fn start_servers(loaded: &Loaded, settings: &Settings, pose: &Pose, tracer: &Tra
         let points = generate_points(scene, pose, tracer, &generate, &|done| bar.set(done as u64))?;
         drop(bar);
         for &hz in &settings.hz {
-            let bar = Bar::new(&format!("first visibility, N = {points_per_m2}"), points.anchors.len() as u64);
+            let bar =
+                Bar::new(&format!("first visibility, N = {points_per_m2}"), points.anchors.len() as u64);
             let progress = |p: Progress| {
                 if let Progress::Tracing(done, _) = p {
                     bar.set(done as u64);
                 }
             };
             let rays = points.anchors.len() as u64 * u64::from(update.rays);
-            let mut server =
-                Server::with_points(scene.clone(), pose.clone(), tracer.clone(), points.clone(), &config, &progress)?;
+            let mut server = Server::with_points(
+                scene.clone(),
+                pose.clone(),
+                tracer.clone(),
+                points.clone(),
+                &config,
+                &progress,
+            )?;
             let mut client = Client::new(scene.clone(), Limits::default());
             let mut snapshot_bytes = 0;
             if let Some(frame) = server.join()? {

@@ -1,7 +1,7 @@
 //! What an evaluation does, with every default filled in.
 
 use anyhow::{Result, bail};
-use dapple_scene::CameraPath;
+use dapple_scene::{CameraPath, Scene};
 
 use crate::args::{EvalArgs, Method, Size};
 use crate::source::{self, Loaded};
@@ -37,7 +37,7 @@ pub(super) struct Settings {
 impl Settings {
     pub(super) fn new(args: &EvalArgs, loaded: &Loaded) -> Result<Settings> {
         let path = source::find_path(&loaded.scene, args.path.as_deref())?;
-        let whole = path.duration_s(&loaded.scene);
+        let whole = path_seconds(&loaded.scene, &path);
         // A file's own scene gets all of its path; the built-in setting a short piece, to stay under a minute.
         let small = args.scene.scene.is_none() && args.scene.builtin.is_none();
         let seconds = args.seconds.unwrap_or(if small { 2.0 } else { whole }).min(whole);
@@ -116,6 +116,12 @@ impl Settings {
     }
 }
 
+/// How long a path lasts; a camera that stands still watches the animation once, or ten seconds of a still scene.
+fn path_seconds(scene: &Scene, path: &CameraPath) -> f64 {
+    let animated = scene.active_animation.map_or(0.0, |i| f64::from(scene.animations[i as usize].duration()));
+    [path.duration_s(), animated, 10.0].into_iter().find(|s| *s > 0.0).unwrap_or(10.0)
+}
+
 /// Times in the middle of `frames` equal pieces, on the client's frame grid.
 fn frame_times(frames: u32, seconds: f64) -> Vec<f64> {
     (0..frames)
@@ -133,7 +139,10 @@ mod tests {
     #[test]
     fn frames_lie_on_the_grid_inside_the_path() {
         let times = frame_times(4, 15.0);
-        assert_eq!(times, [1.866_666_666_666_666_7, 5.616_666_666_666_666, 9.366_666_666_666_667, 13.116_666_666_666_667]);
+        assert_eq!(
+            times,
+            [1.866_666_666_666_666_7, 5.616_666_666_666_666, 9.366_666_666_666_667, 13.116_666_666_666_667]
+        );
         for n in [1, 3, 900] {
             let times = frame_times(n, 15.0);
             assert!(times.windows(2).all(|w| w[0] < w[1]) && times[times.len() - 1] < 15.0, "{n}");

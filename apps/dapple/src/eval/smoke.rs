@@ -48,10 +48,16 @@ pub(super) fn check(results: &Results) -> Result<()> {
         let per_point = snapshot / row.points.unwrap_or(1).max(1) as f64;
         let method = bound.method;
         check(
-            format!("{method}: visibility PSNR {visibility:.2} dB, at least {}", bound.least_visibility_psnr_db),
+            format!(
+                "{method}: visibility PSNR {visibility:.2} dB, at least {}",
+                bound.least_visibility_psnr_db
+            ),
             visibility >= bound.least_visibility_psnr_db,
         );
-        check(format!("{method}: FLIP {:.4}, at most {}", row.flip, bound.most_flip), row.flip <= bound.most_flip);
+        check(
+            format!("{method}: FLIP {:.4}, at most {}", row.flip, bound.most_flip),
+            row.flip <= bound.most_flip,
+        );
         check(
             format!("{method}: {kbit:.1} kbit/s, more than 0 and at most {}", bound.most_kbit_per_s),
             kbit > 0.0 && kbit <= bound.most_kbit_per_s,

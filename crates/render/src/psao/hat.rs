@@ -1,7 +1,7 @@
 //! The paper's kernel: a hat with two thresholds on normals ([Neff2023] eq. 2–4).
 
-use super::index::Near;
 use super::PointIndex;
+use super::index::Near;
 use crate::gbuffer::RestSurface;
 
 /// Parameters of [Neff2023] eq. 2 and 3.

@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use super::index::Near;
 use super::PointIndex;
+use super::index::Near;
 use crate::gbuffer::RestSurface;
 
 /// Parameters of the fit. Defaults were chosen on one pose of one scene and confirmed on others (`docs/evaluation.md`).

@@ -61,12 +61,14 @@ fn palette(b: &mut GlbBuilder) -> Result<Palette, BuiltinError> {
     let stone = b.texture("stone", size, &textures::stone(), false)?;
     let wood = b.texture("wood", size, &textures::wood(), false)?;
     let lattice = b.texture("lattice", size, &textures::lattice(), false)?;
-    let textured = |texture, roughness| MaterialSpec { texture: Some(texture), roughness, ..Default::default() };
+    let textured =
+        |texture, roughness| MaterialSpec { texture: Some(texture), roughness, ..Default::default() };
     let metal = |r: f32, g: f32, bl: f32, roughness: f32| MaterialSpec {
         metallic: 1.0,
         ..MaterialSpec::matt(r, g, bl, roughness)
     };
-    let cloth = |r: f32, g: f32, bl: f32| MaterialSpec { double_sided: true, ..MaterialSpec::matt(r, g, bl, 0.95) };
+    let cloth =
+        |r: f32, g: f32, bl: f32| MaterialSpec { double_sided: true, ..MaterialSpec::matt(r, g, bl, 0.95) };
     Ok(Palette {
         stone: b.material("stone", &textured(stone, 0.85)),
         marble: b.material("marble", &MaterialSpec::matt(0.74, 0.66, 0.54, 0.5)),
@@ -125,9 +127,13 @@ fn build_structure(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
     let beam = b.mesh("beam", &[(&beam, p.plaster)]);
     b.node("beam", &NodeSpec::mesh_at(beam, Vec3::ZERO, 0.0));
     // Mouldings: bands that stand out from the slab's edge and from the beam.
-    let mut bands = ring_slab(WELL + Vec2::splat(0.1), WELL - Vec2::splat(0.07), [GALLERY - 0.13, GALLERY - 0.02]);
+    let mut bands =
+        ring_slab(WELL + Vec2::splat(0.1), WELL - Vec2::splat(0.07), [GALLERY - 0.13, GALLERY - 0.02]);
     let mut band = |outer: f32, inner: f32, y0: f32, y1: f32| {
-        bands.append_at(&ring_slab(COLUMNS + Vec2::splat(outer), COLUMNS - Vec2::splat(inner), [y0, y1]), Vec3::ZERO);
+        bands.append_at(
+            &ring_slab(COLUMNS + Vec2::splat(outer), COLUMNS - Vec2::splat(inner), [y0, y1]),
+            Vec3::ZERO,
+        );
     };
     band(0.24, 0.24, BEAM_BOTTOM + 0.28, BEAM_BOTTOM + 0.36);
     band(0.27, 0.27, CEILING - 0.20, CEILING - 0.10);
@@ -141,7 +147,9 @@ fn build_structure(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
     let half = 0.5 * ARCADE_THICKNESS;
     let long = b.mesh("arcade-long", &[(&parts::arcade(6, half, detail), p.stone)]);
     let short = b.mesh("arcade-short", &[(&parts::arcade(3, 0.02 - half, detail), p.stone)]);
-    for (mesh, name, turns) in [(long, "arcade-long", [0.0, PI]), (short, "arcade-short", [FRAC_PI_2, -FRAC_PI_2])] {
+    for (mesh, name, turns) in
+        [(long, "arcade-long", [0.0, PI]), (short, "arcade-short", [FRAC_PI_2, -FRAC_PI_2])]
+    {
         for turn in turns {
             let out = if mesh == long { COLUMNS.y } else { COLUMNS.x };
             let center = rotation_y(turn) * Vec3::new(0.0, 0.0, out);
@@ -198,9 +206,12 @@ fn build_furniture(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
     let clay = b.mesh("vase-clay", &[(&parts::vase(detail), p.terracotta)]);
     let glazed = b.mesh("vase-glazed", &[(&parts::vase(detail), p.glaze)]);
     let pots: Vec<MeshId> = (0..2)
-        .map(|i| b.mesh("pot", &[(&parts::pot(detail), p.terracotta), (&parts::leaves(70 + i, detail), p.leaf)]))
+        .map(|i| {
+            b.mesh("pot", &[(&parts::pot(detail), p.terracotta), (&parts::leaves(70 + i, detail), p.leaf)])
+        })
         .collect();
-    let earth = super::shapes::lathe(&[Vec2::new(0.35, 0.45), Vec2::new(0.35, 0.492), Vec2::new(0.0, 0.51)], 16);
+    let earth =
+        super::shapes::lathe(&[Vec2::new(0.35, 0.45), Vec2::new(0.35, 0.492), Vec2::new(0.0, 0.51)], 16);
     let earth = b.mesh("earth", &[(&earth, p.earth)]);
     let crates = b.mesh("crate", &[(&parts::crate_box(), p.wood)]);
     let table = b.mesh("table", &[(&parts::table(detail), p.wood)]);
@@ -208,7 +219,8 @@ fn build_furniture(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
     let screen =
         b.mesh("lattice-screen", &[(&parts::screen_filling(), p.lattice), (&parts::screen_frame(), p.wood)]);
     let mut put = |name: &str, mesh: MeshId, place: &Place| {
-        let spec = NodeSpec { scale: Vec3::splat(place.scale), ..NodeSpec::mesh_at(mesh, place.at, place.turn) };
+        let spec =
+            NodeSpec { scale: Vec3::splat(place.scale), ..NodeSpec::mesh_at(mesh, place.at, place.turn) };
         b.node(name, &spec);
     };
     for (i, place) in VASES.iter().enumerate() {
@@ -373,7 +385,13 @@ fn light(b: &mut GlbBuilder, p: &Palette, animation: AnimationId, detail: Detail
 
 fn roll_boulders(b: &mut GlbBuilder, p: &Palette, animation: AnimationId, detail: Detail) {
     // Triangles of an icosphere fall by 4 a level.
-    let level = if detail.0 > 0.5 { 4 } else if detail.0 > 0.15 { 3 } else { 2 };
+    let level = if detail.0 > 0.5 {
+        4
+    } else if detail.0 > 0.15 {
+        3
+    } else {
+        2
+    };
     let rocks: Vec<MeshId> = (0..ROCKS)
         .map(|i| b.mesh("boulder", &[(&boulder(level, motion::rock_seed(i)), p.rocks[i as usize])]))
         .collect();

@@ -129,7 +129,8 @@ pub(super) fn railing(detail: Detail) -> Geometry {
         let x = 2.0 * half * ((i as f32 + 0.5) / bars as f32 - 0.5);
         g.append_at(&bar, Vec3::new(x, 0.0, 0.0));
     }
-    let rail = |y: f32, radius: f32| tube(&[Vec3::new(-half, y, 0.0), Vec3::new(half, y, 0.0)], radius, sides + 2);
+    let rail =
+        |y: f32, radius: f32| tube(&[Vec3::new(-half, y, 0.0), Vec3::new(half, y, 0.0)], radius, sides + 2);
     g.append_at(&rail(0.06, 0.014), Vec3::ZERO);
     g.append_at(&rail(RAIL_HEIGHT - 0.13, 0.010), Vec3::ZERO);
     g.append_at(&rail(RAIL_HEIGHT, 0.026), Vec3::ZERO);
@@ -159,7 +160,15 @@ pub(super) fn stair_railing(detail: Detail) -> Geometry {
     let lower = Vec3::Y * 0.16;
     g.append_at(&tube(&[first + lower, last + lower], 0.010, sides), Vec3::ZERO);
     let post = lathe(
-        &[v2(0.035, -0.01), v2(0.035, 0.1), v2(0.022, 0.16), v2(0.022, 0.82), v2(0.04, 0.86), v2(0.045, 0.92), v2(0.0, 0.99)],
+        &[
+            v2(0.035, -0.01),
+            v2(0.035, 0.1),
+            v2(0.022, 0.16),
+            v2(0.022, 0.82),
+            v2(0.04, 0.86),
+            v2(0.045, 0.92),
+            v2(0.0, 0.99),
+        ],
         detail.facets(16, 6),
     );
     g.append_at(&post, Vec3::new(first.x, RISER, 0.0));
@@ -180,7 +189,8 @@ pub(super) fn vase(detail: Detail) -> Geometry {
         v2(0.11, 0.84),
         v2(0.165, 0.9),
     ];
-    let inside = [v2(0.145, 0.895), v2(0.09, 0.83), v2(0.085, 0.77), v2(0.17, 0.66), v2(0.22, 0.45), v2(0.0, 0.3)];
+    let inside =
+        [v2(0.145, 0.895), v2(0.09, 0.83), v2(0.085, 0.77), v2(0.17, 0.66), v2(0.22, 0.45), v2(0.0, 0.3)];
     let mut profile = vec![v2(0.0, -0.01), v2(0.13, -0.01)];
     profile.extend(rounded(&outside, bend));
     profile.extend(rounded(&inside, bend));
@@ -223,7 +233,10 @@ pub(super) fn leaves(seed: u32, detail: Detail) -> Geometry {
                 Frame { origin, x: side * (width / wide), y: along.cross(side) }
             })
             .collect();
-        g.append_at(&sweep(&frames, &rectangle(v2(-wide, -0.002), v2(wide, 0.002)), false, false), Vec3::ZERO);
+        g.append_at(
+            &sweep(&frames, &rectangle(v2(-wide, -0.002), v2(wide, 0.002)), false, false),
+            Vec3::ZERO,
+        );
     }
     g
 }
@@ -232,14 +245,23 @@ pub(super) fn leaves(seed: u32, detail: Detail) -> Geometry {
 pub(super) fn crate_box() -> Geometry {
     let h = 0.4;
     let mut g = cuboid(Vec3::new(-h + 0.03, 0.02, -h + 0.03), Vec3::new(h - 0.03, 0.78, h - 0.03));
-    let bar = |g: &mut Geometry, a: Vec3, b: Vec3| g.append_at(&beveled_box(a.min(b), a.max(b), 0.008), Vec3::ZERO);
+    let bar =
+        |g: &mut Geometry, a: Vec3, b: Vec3| g.append_at(&beveled_box(a.min(b), a.max(b), 0.008), Vec3::ZERO);
     for s in [-1.0, 1.0] {
         for t in [-1.0, 1.0] {
             let corner = |y: f32, inset: f32| Vec3::new(s * (h - inset), y, t * (h - inset));
             bar(&mut g, corner(0.0, 0.0), corner(0.8, 0.085));
             for y in [0.004, 0.711] {
-                bar(&mut g, Vec3::new(-h + 0.08, y, t * (h - 0.006)), Vec3::new(h - 0.08, y + 0.085, t * (h - 0.06)));
-                bar(&mut g, Vec3::new(s * (h - 0.006), y, -h + 0.08), Vec3::new(s * (h - 0.06), y + 0.085, h - 0.08));
+                bar(
+                    &mut g,
+                    Vec3::new(-h + 0.08, y, t * (h - 0.006)),
+                    Vec3::new(h - 0.08, y + 0.085, t * (h - 0.06)),
+                );
+                bar(
+                    &mut g,
+                    Vec3::new(s * (h - 0.006), y, -h + 0.08),
+                    Vec3::new(s * (h - 0.06), y + 0.085, h - 0.08),
+                );
             }
         }
         let brace = beveled_box(Vec3::new(-0.44, -0.04, -0.02), Vec3::new(0.44, 0.04, 0.02), 0.006);
@@ -260,7 +282,15 @@ pub(super) fn table(detail: Detail) -> Geometry {
     g.append_at(&cuboid(Vec3::new(-0.78, 0.60, -0.30), Vec3::new(0.78, 0.715, 0.30)), Vec3::ZERO);
     let leg = lathe(
         &rounded(
-            &[v2(0.022, -0.005), v2(0.03, 0.05), v2(0.024, 0.12), v2(0.042, 0.3), v2(0.03, 0.5), v2(0.045, 0.56), v2(0.045, 0.712)],
+            &[
+                v2(0.022, -0.005),
+                v2(0.03, 0.05),
+                v2(0.024, 0.12),
+                v2(0.042, 0.3),
+                v2(0.03, 0.5),
+                v2(0.045, 0.56),
+                v2(0.045, 0.712),
+            ],
             detail.facets(4, 1),
         ),
         detail.facets(20, 6),
@@ -277,7 +307,10 @@ pub(super) fn table(detail: Detail) -> Geometry {
 pub(super) fn bench() -> Geometry {
     let mut g = beveled_box(Vec3::new(-0.85, 0.36, -0.21), Vec3::new(0.85, 0.45, 0.21), 0.02);
     for x in [-0.55, 0.55] {
-        g.append_at(&beveled_box(Vec3::new(-0.11, -0.01, -0.16), Vec3::new(0.11, 0.37, 0.16), 0.015), Vec3::X * x);
+        g.append_at(
+            &beveled_box(Vec3::new(-0.11, -0.01, -0.16), Vec3::new(0.11, 0.37, 0.16), 0.015),
+            Vec3::X * x,
+        );
     }
     g
 }
@@ -287,7 +320,8 @@ pub(super) fn fountain(detail: Detail) -> Geometry {
     let bend = detail.facets(5, 1);
     let [radius, height] = FOUNTAIN;
     let mut profile = vec![v2(0.0, -0.02), v2(radius - 0.05, -0.02), v2(radius - 0.05, 0.08)];
-    profile.extend(rounded(&[v2(radius - 0.12, 0.14), v2(radius - 0.14, 0.26), v2(radius - 0.08, 0.34)], bend));
+    profile
+        .extend(rounded(&[v2(radius - 0.12, 0.14), v2(radius - 0.14, 0.26), v2(radius - 0.08, 0.34)], bend));
     profile.extend(rounded(&[v2(radius - 0.02, 0.36), v2(radius, 0.40), v2(radius - 0.02, height)], bend));
     profile.extend([v2(radius - 0.18, height), v2(radius - 0.2, height - 0.2), v2(0.16, height - 0.2)]);
     profile.extend(rounded(&[v2(0.14, 0.3), v2(0.10, 0.55), v2(0.09, 0.75), v2(0.14, 0.95)], bend));
@@ -307,10 +341,16 @@ pub(super) fn water(detail: Detail) -> Geometry {
 pub(super) fn screen_frame() -> Geometry {
     let mut g = Geometry::new();
     for x in [-1.02, 0.0, 1.02] {
-        g.append_at(&beveled_box(Vec3::new(x - 0.03, -0.01, -0.03), Vec3::new(x + 0.03, 2.3, 0.03), 0.006), Vec3::ZERO);
+        g.append_at(
+            &beveled_box(Vec3::new(x - 0.03, -0.01, -0.03), Vec3::new(x + 0.03, 2.3, 0.03), 0.006),
+            Vec3::ZERO,
+        );
     }
     for y in [0.05, 0.75, 2.2] {
-        g.append_at(&beveled_box(Vec3::new(-1.0, y, -0.024), Vec3::new(1.0, y + 0.07, 0.024), 0.006), Vec3::ZERO);
+        g.append_at(
+            &beveled_box(Vec3::new(-1.0, y, -0.024), Vec3::new(1.0, y + 0.07, 0.024), 0.006),
+            Vec3::ZERO,
+        );
     }
     g
 }
@@ -318,7 +358,12 @@ pub(super) fn screen_frame() -> Geometry {
 /// A lattice screen's filling: one layer.
 pub(super) fn screen_filling() -> Geometry {
     let mut g = Geometry::new();
-    g.polygon(&[Vec3::new(-1.0, 0.1, 0.0), Vec3::new(1.0, 0.1, 0.0), Vec3::new(1.0, 2.22, 0.0), Vec3::new(-1.0, 2.22, 0.0)]);
+    g.polygon(&[
+        Vec3::new(-1.0, 0.1, 0.0),
+        Vec3::new(1.0, 0.1, 0.0),
+        Vec3::new(1.0, 2.22, 0.0),
+        Vec3::new(-1.0, 2.22, 0.0),
+    ]);
     g
 }
 
@@ -348,7 +393,8 @@ pub(super) fn lantern_metal(detail: Detail) -> Geometry {
     let mut profile = vec![v2(0.0, -0.59), v2(0.14, -0.60)];
     profile.append(&mut dome);
     g.append_at(&lathe(&profile, sides), Vec3::ZERO);
-    let foot = rounded(&[v2(0.0, -0.93), v2(0.02, -0.91), v2(0.03, -0.88), v2(0.10, -0.84), v2(0.105, -0.82)], bend);
+    let foot =
+        rounded(&[v2(0.0, -0.93), v2(0.02, -0.91), v2(0.03, -0.88), v2(0.10, -0.84), v2(0.105, -0.82)], bend);
     let mut foot = foot;
     foot.push(v2(0.0, -0.82));
     g.append_at(&lathe(&foot, sides), Vec3::ZERO);
@@ -463,7 +509,12 @@ pub(super) fn skylight_beams() -> Geometry {
 pub(super) fn shell() -> [Geometry; 3] {
     let (x, z) = (ROOM.x, ROOM.y);
     let mut floor = Geometry::new();
-    floor.polygon(&[Vec3::new(-x, 0.0, z), Vec3::new(x, 0.0, z), Vec3::new(x, 0.0, -z), Vec3::new(-x, 0.0, -z)]);
+    floor.polygon(&[
+        Vec3::new(-x, 0.0, z),
+        Vec3::new(x, 0.0, z),
+        Vec3::new(x, 0.0, -z),
+        Vec3::new(-x, 0.0, -z),
+    ]);
     let mut walls = Geometry::new();
     let corners = [Vec2::new(-x, z), Vec2::new(-x, -z), Vec2::new(x, -z), Vec2::new(x, z)];
     for i in 0..4 {

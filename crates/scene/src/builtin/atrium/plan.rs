@@ -188,7 +188,8 @@ pub(super) fn solids() -> Vec<Solid> {
         solids.push(Solid::Cylinder { base, radius: 0.2, height: BEAM_BOTTOM - GALLERY });
     }
     for bay in bays().iter().filter(|b| !b.stairs) {
-        let along = Vec2::new(bay.outward.y.abs(), bay.outward.x.abs()) * (0.5 * BAY) + bay.outward.abs() * 0.04;
+        let along =
+            Vec2::new(bay.outward.y.abs(), bay.outward.x.abs()) * (0.5 * BAY) + bay.outward.abs() * 0.04;
         let (lo, hi) = (bay.center - along, bay.center + along);
         solids.push(boxed(lo.x, GALLERY, lo.y, hi.x, GALLERY + RAIL_HEIGHT, hi.y));
     }
@@ -226,7 +227,10 @@ pub(super) fn solids() -> Vec<Solid> {
         }
     }
     for screen in SCREENS {
-        let thin = Vec2::new(if screen.turn == 0.0 { 1.06 } else { 0.06 }, if screen.turn == 0.0 { 0.06 } else { 1.06 });
+        let thin = Vec2::new(
+            if screen.turn == 0.0 { 1.06 } else { 0.06 },
+            if screen.turn == 0.0 { 0.06 } else { 1.06 },
+        );
         let a = screen.at;
         solids.push(boxed(a.x - thin.x, a.y, a.z - thin.y, a.x + thin.x, a.y + 2.3, a.z + thin.y));
     }

@@ -16,7 +16,10 @@ pub fn cloth(width: f32, height: f32, folds: f32, depth: f32, [nx, ny]: [u32; 2]
         let spread = 0.93 + 0.07 * t;
         let wander = 0.45 * value_noise(seed, Vec3::new(3.0 * s, 1.7 * t, 0.5));
         let phase = std::f32::consts::TAU * (folds * s + wander * (0.3 + t));
-        let amplitude = 0.5 * depth * (0.55 + 0.45 * t) * (1.0 + 0.35 * value_noise(seed ^ 77, Vec3::new(5.0 * s, t, 0.0)));
+        let amplitude = 0.5
+            * depth
+            * (0.55 + 0.45 * t)
+            * (1.0 + 0.35 * value_noise(seed ^ 77, Vec3::new(5.0 * s, t, 0.0)));
         let sway = 0.06 * depth * value_noise(seed ^ 5, Vec3::new(2.0 * s, 4.0 * t, 2.0));
         let z = amplitude * libm::sinf(phase) + sway;
         Vec3::new(width * (s - 0.5) * spread, -height * t, z)
@@ -84,9 +87,26 @@ fn icosphere(level: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
         points.push(Vec3::new(a, 0.0, b).normalize());
     }
     let mut triangles: Vec<[u32; 3]> = vec![
-        [0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11], [1, 5, 9], [5, 11, 4], [11, 10, 2], [10, 7, 6],
-        [7, 1, 8], [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8], [3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10],
-        [8, 6, 7], [9, 8, 1],
+        [0, 11, 5],
+        [0, 5, 1],
+        [0, 1, 7],
+        [0, 7, 10],
+        [0, 10, 11],
+        [1, 5, 9],
+        [5, 11, 4],
+        [11, 10, 2],
+        [10, 7, 6],
+        [7, 1, 8],
+        [3, 9, 4],
+        [3, 4, 2],
+        [3, 2, 6],
+        [3, 6, 8],
+        [3, 8, 9],
+        [4, 9, 5],
+        [2, 4, 11],
+        [6, 2, 10],
+        [8, 6, 7],
+        [9, 8, 1],
     ];
     for _ in 0..level.min(7) {
         let mut middles: BTreeMap<(u32, u32), u32> = BTreeMap::new();

@@ -229,7 +229,9 @@ impl<'a> Document<'a> {
         let index_component = match indices.uint("componentType")?.and_then(Component::from_code) {
             Some(c @ (Component::U8 | Component::U16 | Component::U32)) => c,
             _ => {
-                return Err(indices.invalid("componentType must be 5121, 5123 or 5125; export the file again"));
+                return Err(
+                    indices.invalid("componentType must be 5121, 5123 or 5125; export the file again")
+                );
             }
         };
         let view = |object: &Object<'_>| {
