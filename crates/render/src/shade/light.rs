@@ -95,10 +95,10 @@ pub(super) fn active_lights(scene: &Scene, pose: &Pose, params: &ShadeParams) ->
         let posed = PosedLight { light: 0, position_world: Vec3::ZERO, direction_world };
         ActiveLight::new(&light, &posed, throws_shadow)
     };
-    // Lux such that white faces reach a radiance of 0.6 and 0.06.
+    // Lux such that white faces reach a radiance of 0.7 and 0.05.
     vec![
-        directional(Vec3::new(-0.45, -1.0, -0.6), 1.885, params.max_shadowed_lights > 0),
-        directional(Vec3::new(0.5, 0.3, 0.8), 0.188, false),
+        directional(Vec3::new(-0.45, -1.0, -0.6), 2.2, params.max_shadowed_lights > 0),
+        directional(Vec3::new(0.5, 0.3, 0.8), 0.16, false),
     ]
 }
 

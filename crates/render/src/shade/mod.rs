@@ -41,8 +41,8 @@ impl Default for ShadeParams {
     fn default() -> Self {
         ShadeParams {
             ambient: Ambient::Hemisphere {
-                sky: Vec3::new(0.50, 0.54, 0.60),
-                ground: Vec3::new(0.26, 0.24, 0.22),
+                sky: Vec3::new(0.36, 0.40, 0.46),
+                ground: Vec3::new(0.17, 0.16, 0.15),
             },
             background: Vec3::new(0.05, 0.06, 0.08),
             specular: true,
