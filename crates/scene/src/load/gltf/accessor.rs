@@ -63,6 +63,12 @@ impl Allowed {
     }
 }
 
+/// Everything that can be read at all.
+pub(super) const ANY: Allowed = Allowed::new(
+    &["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"],
+    &[Component::I8, Component::U8, Component::I16, Component::U16, Component::U32, Component::F32],
+);
+
 /// A strided run of elements inside a buffer.
 #[derive(Clone, Copy)]
 struct Strided<'a> {
@@ -229,7 +235,9 @@ impl<'a> Document<'a> {
         let index_component = match indices.uint("componentType")?.and_then(Component::from_code) {
             Some(c @ (Component::U8 | Component::U16 | Component::U32)) => c,
             _ => {
-                return Err(indices.invalid("componentType must be 5121, 5123 or 5125; export the file again"));
+                return Err(
+                    indices.invalid("componentType must be 5121, 5123 or 5125; export the file again")
+                );
             }
         };
         let view = |object: &Object<'_>| {
