@@ -12,6 +12,14 @@ const ORBIT_PERIOD_S: f64 = 20.0;
 const TURNTABLE_RADII: f32 = 1.6;
 /// Elevation of the orbit around an object, radians (20°).
 const TURNTABLE_ELEVATION: f32 = 0.349;
+/// Free distance that makes a place a room, as a part of the scene's diagonal.
+const MIN_FREE_OF_DIAGONAL: f32 = 0.05;
+/// Hollow things with an outside are objects below this diagonal.
+const BUILDING_DIAGONAL_M: f32 = 10.0;
+/// Places that are tried for the middle of a room.
+const PLACES: usize = 9;
+/// Rays sent from each.
+const RAYS: usize = 14;
 /// Height of eyes above the floor, metres.
 const EYE_HEIGHT_M: f32 = 1.7;
 
@@ -129,11 +137,12 @@ fn free_name(paths: &[CameraPath], name: &str) -> String {
     std::iter::once(name.to_owned()).chain(numbered).find(|name| !taken(name)).unwrap_or_default()
 }
 
-/// The computed orbit: inside the scene if it encloses a place at its middle, else around it.
+/// The computed orbit: inside the scene if there is a room about its middle, else around it.
 ///
-/// From up to three heights above the middle of the floor (eye height, a quarter, half of the box) 14 rays go out.
-/// Where at least three in five of them first meet a front face, the place is inside a building; what is seen from
-/// inside an object shows its back faces. The camera then walks a small circle around that place and looks across it.
+/// From nine places 14 rays go out. A place is in a room if at least three in five of them first meet a front face (the
+/// inside of a solid object shows back faces) and if it has some room to the sides. A hollow thing that is smaller
+/// than a building and whose outside is modelled too is an object all the same. In the roomiest place the camera
+/// walks a small circle and looks across it.
 fn orbit(scene: &Scene) -> Orbit {
     let pose = scene.pose(0.0);
     let bounds = scene.bounds_world(&pose);
@@ -143,17 +152,22 @@ fn orbit(scene: &Scene) -> Orbit {
     }
     let diagonal = bounds.diagonal();
     let near_m = (1e-3 * diagonal).clamp(1e-6, 0.1);
-    let floor = Vec3::new(bounds.center().x, bounds.min.y, bounds.center().z);
-    let height = bounds.max.y - bounds.min.y;
-    let heights = [EYE_HEIGHT_M.min(0.4 * height), 0.25 * height, 0.5 * height];
-    let places = heights.map(|h| floor + h * Vec3::Y);
+    let places = candidate_places(&bounds);
+    let mut best: Option<(Vec3, f32)> = None;
     for (place, views) in places.into_iter().zip(look_around(scene, &pose, &places)) {
-        let fronts = views.iter().filter(|view| view.is_front).count();
-        if 5 * fronts >= 3 * views.len() {
-            let free = views.iter().filter(|view| view.is_horizontal).map(|view| view.distance);
-            let free = free.fold(diagonal, f32::min);
-            return Orbit { center_world: place, radius_m: 0.4 * free, target_world: place, near_m };
+        let most = |count: usize| 5 * count >= 3 * RAYS;
+        let walls = views.iter().filter(|view| view.nearest_is_front).count();
+        let hull = views.iter().filter(|view| view.farthest_is_front).count();
+        let free_m =
+            views.iter().filter(|view| !view.is_vertical).fold(diagonal, |free, view| free.min(view.nearest));
+        let is_room = most(walls) && free_m >= MIN_FREE_OF_DIAGONAL * diagonal;
+        let is_shell = most(hull) && diagonal < BUILDING_DIAGONAL_M;
+        if is_room && !is_shell && best.is_none_or(|(_, most_free_m)| free_m > most_free_m) {
+            best = Some((place, free_m));
         }
+    }
+    if let Some((place, free_m)) = best {
+        return Orbit { center_world: place, radius_m: 0.4 * free_m, target_world: place, near_m };
     }
     // Animated objects move out of their first box.
     let whole = scene.animations.get(scene.active_animation.unwrap_or(u32::MAX) as usize).map_or(
@@ -176,47 +190,71 @@ fn orbit(scene: &Scene) -> Orbit {
     }
 }
 
-/// What one ray meets first.
+/// Places where the middle of a room may be: three heights at the centre and half way to both ends.
+fn candidate_places(bounds: &Aabb) -> [Vec3; PLACES] {
+    let size = bounds.max - bounds.min;
+    // Scenes whose units are not metres have no sensible eye height.
+    let eye = if (2.0..40.0).contains(&size.y) { EYE_HEIGHT_M } else { 0.35 * size.y };
+    let aside = if size.x >= size.z { 0.25 * size.x * Vec3::X } else { 0.25 * size.z * Vec3::Z };
+    let floor = Vec3::new(bounds.center().x, bounds.min.y, bounds.center().z);
+    std::array::from_fn(|i| {
+        let height = [eye, 0.25 * size.y, 0.5 * size.y][i % 3];
+        floor + height * Vec3::Y + [0.0, 1.0, -1.0][i / 3] * aside
+    })
+}
+
+/// What one ray meets.
 #[derive(Clone, Copy)]
 struct View {
-    distance: f32,
-    is_front: bool,
-    is_horizontal: bool,
+    /// Distance of the first triangle, infinite without one.
+    nearest: f32,
+    nearest_is_front: bool,
+    /// Distance of the last triangle.
+    farthest: f32,
+    /// Whether the last triangle is seen from its front by who looks back from beyond it.
+    farthest_is_front: bool,
+    is_vertical: bool,
 }
 
 /// Rays along the axes and space diagonals from each place, against every triangle.
-fn look_around(scene: &Scene, pose: &Pose, places: &[Vec3; 3]) -> [[View; 14]; 3] {
+fn look_around(scene: &Scene, pose: &Pose, places: &[Vec3; PLACES]) -> [[View; RAYS]; PLACES] {
     let mut directions = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z].to_vec();
     for i in 0..8 {
         let sign = |bit: i32| if i & bit == 0 { 1.0 } else { -1.0 };
         // Flatter than cube corners, and off the symmetry planes of what people build.
         directions.push(Vec3::new(sign(1) * 0.9, sign(2) * 0.45, sign(4) * 0.8).normalize());
     }
-    let mut views = [[View { distance: f32::INFINITY, is_front: false, is_horizontal: false }; 14]; 3];
+    let nothing = View {
+        nearest: f32::INFINITY,
+        nearest_is_front: false,
+        farthest: 0.0,
+        farthest_is_front: false,
+        is_vertical: false,
+    };
+    let mut views = [[nothing; RAYS]; PLACES];
     for view in &mut views {
         for (view, direction) in view.iter_mut().zip(&directions) {
-            view.is_horizontal = direction.y == 0.0;
+            view.is_vertical = direction.y.abs() == 1.0;
         }
     }
     for (i, (instance, posed)) in scene.instances.iter().zip(&pose.instances).enumerate() {
         let mesh = &scene.meshes[instance.mesh as usize];
         let positions = scene.vertex_positions(pose, i);
-        let materials = mesh.parts.iter().flat_map(|part| {
-            std::iter::repeat_n(&scene.materials[part.material as usize], part.triangle_count as usize)
-        });
         let mirrored = posed.world_from_mesh.matrix3.determinant() < 0.0;
-        for (triangle, material) in mesh.triangles.iter().zip(materials) {
+        for triangle in &mesh.triangles {
             let [a, b, c] = triangle.map(|v| posed.world_from_mesh.transform_point3(positions[v as usize]));
             let normal = (b - a).cross(c - a);
             let bounds = Aabb::from_points([a, b, c]);
             for (place, views) in places.iter().zip(&mut views) {
                 for (view, direction) in views.iter_mut().zip(&directions) {
-                    if let Some(distance) = hit(*place, *direction, [a, b, c], normal, &bounds)
-                        && distance < view.distance
-                    {
-                        view.distance = distance;
-                        // A sheet seen from both sides has no inside.
-                        view.is_front = material.double_sided || (normal.dot(*direction) < 0.0) != mirrored;
+                    if let Some(distance) = hit(*place, *direction, [a, b, c], normal, &bounds) {
+                        let is_front = (normal.dot(*direction) < 0.0) != mirrored;
+                        if distance < view.nearest {
+                            (view.nearest, view.nearest_is_front) = (distance, is_front);
+                        }
+                        if distance > view.farthest {
+                            (view.farthest, view.farthest_is_front) = (distance, !is_front);
+                        }
                     }
                 }
             }

@@ -248,4 +248,5 @@ fn clean(positions: &mut [Vec3], normals: &mut [Vec3], fallback: &[Vec3]) {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "tests may panic")]
 mod tests;

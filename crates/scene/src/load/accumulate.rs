@@ -128,6 +128,7 @@ pub(super) fn normalize_weights(influences: &mut [SkinInfluences]) -> usize {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "tests may panic")]
 mod tests {
     use super::*;
     use crate::load::NoFiles;

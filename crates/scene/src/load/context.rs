@@ -17,7 +17,7 @@ pub(super) const EXTERNAL_FILE_LIMIT_BYTES: u64 = 2 << 30;
 const MAX_WARNINGS: usize = 100;
 
 /// Coordinates and animated values beyond this are refused: their squares would overflow.
-pub(super) const LARGEST_NUMBER: f32 = 1e15;
+const LARGEST_NUMBER: f32 = 1e15;
 
 pub(super) struct Context<'a> {
     pub(super) file: &'a str,
@@ -115,7 +115,7 @@ impl<'a> Context<'a> {
     }
 }
 
-/// Whether a number can be computed with.
+/// Whether a number can be computed with: neither NaN nor too large.
 pub(super) fn is_usable(x: f32) -> bool {
     x.abs() <= LARGEST_NUMBER
 }

@@ -78,7 +78,9 @@ pub enum LoadError {
         property: &'static str,
     },
     /// A reference to something that does not exist.
-    #[error("{file}: {at} refers to {what} {index}, but there are only {count}; export the file again")]
+    #[error(
+        "{file}: {at} refers to {what} {index}, but there are only {count}, counted from 0; export the file again"
+    )]
     OutOfRange {
         /// The scene file.
         file: String,

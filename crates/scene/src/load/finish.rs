@@ -5,7 +5,7 @@ use std::collections::BinaryHeap;
 
 use glam::{Mat3, Vec3};
 
-use super::context::{Context, LARGEST_NUMBER};
+use super::context::{Context, is_usable};
 use super::{LoadError, normals};
 use crate::{Instance, Mesh, Scene};
 
@@ -134,8 +134,7 @@ fn set_rest_scale<'l>(
     for (i, instance) in scene.instances.iter().enumerate() {
         let bounds = scene.instance_bounds_world(&pose, i);
         let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
-        // Written so that NaN fails too.
-        if !(largest <= LARGEST_NUMBER) {
+        if !is_usable(largest) {
             return Err(context.not_finite(format!("the place in the world of {}", label_of(instance.node))));
         }
         scales.push(if instance.skin.is_some() {

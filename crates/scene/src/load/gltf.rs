@@ -46,6 +46,7 @@ pub(super) fn load_json(context: &Context<'_>, json: &[u8], bin: Option<&[u8]>) 
         Object::new(context, &value, String::new()).map_err(|_| parse_error("not an object".to_owned()))?;
     check_version(context, &root)?;
     check_extensions(context, &root)?;
+    root.uint("scene")?;
     let document = Document::new(context, root, bin)?;
 
     let mut draft = finish::Draft::default();

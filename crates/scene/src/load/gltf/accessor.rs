@@ -63,6 +63,12 @@ impl Allowed {
     }
 }
 
+/// Everything that can be read at all.
+pub(super) const ANY: Allowed = Allowed::new(
+    &["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"],
+    &[Component::I8, Component::U8, Component::I16, Component::U16, Component::U32, Component::F32],
+);
+
 /// A strided run of elements inside a buffer.
 #[derive(Clone, Copy)]
 struct Strided<'a> {

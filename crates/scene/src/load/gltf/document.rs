@@ -4,6 +4,7 @@ use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::rc::Rc;
 
+use super::accessor::ANY;
 use super::json::Object;
 use crate::load::context::Context;
 use crate::load::{LoadError, uri};
@@ -109,8 +110,8 @@ impl<'a> Document<'a> {
                 self.context.warn(format!("not needed by the scene, but wrong: {failure}"));
             }
         }
-        for i in 0..self.views.len() {
-            if let Err(flaw) = self.view(i) {
+        for i in 0..self.accessors.len() {
+            if let Err(flaw) = self.elements(i, "unused".to_owned(), ANY) {
                 self.context.warn(format!("not needed by the scene, but wrong: {flaw}"));
             }
         }

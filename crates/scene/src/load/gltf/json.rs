@@ -188,7 +188,7 @@ fn as_uint(value: &Value) -> Option<u64> {
         return Some(n);
     }
     let x = value.as_f64()?;
-    (x >= 0.0 && x <= 9e15 && x.fract() == 0.0).then_some(x as u64)
+    ((0.0..=9e15).contains(&x) && x.fract() == 0.0).then_some(x as u64)
 }
 
 fn wrong_type(context: &Context<'_>, at: String, expected: &'static str, found: &Value) -> LoadError {

@@ -212,7 +212,7 @@ impl Reader<'_> {
         let n = corners.len();
         Ok(match mode {
             4 => {
-                if n % 3 != 0 {
+                if !n.is_multiple_of(3) {
                     let at = &self.primitive.at;
                     context.warn(format!(
                         "{at}: {n} corners are not whole triangles; the last {} are left out",
