@@ -401,9 +401,10 @@ impl GlbBuilder {
     ) {
         let input = self.time_accessor(times);
         let (property, output) = match track {
-            Track::Translation(v) => {
-                (json::animation::Property::Translation, self.push_floats(flat3(v), Type::Vec3, Bounds::No, None))
-            }
+            Track::Translation(v) => (
+                json::animation::Property::Translation,
+                self.push_floats(flat3(v), Type::Vec3, Bounds::No, None),
+            ),
             Track::Rotation(q) => {
                 let xyzw: Vec<f32> = q.iter().flat_map(|q| q.to_array()).collect();
                 (json::animation::Property::Rotation, self.push_floats(&xyzw, Type::Vec4, Bounds::No, None))
@@ -463,7 +464,8 @@ impl GlbBuilder {
         pad(&mut text, b' ');
         let total = 12 + 8 + text.len() + 8 + self.bin.len();
         let size = |n: usize| {
-            u32::try_from(n).map_err(|_| BuiltinError::Write(format!("{n} bytes do not fit into one GLB (4 GiB)")))
+            u32::try_from(n)
+                .map_err(|_| BuiltinError::Write(format!("{n} bytes do not fit into one GLB (4 GiB)")))
         };
         let mut glb = Vec::with_capacity(total);
         glb.extend_from_slice(b"glTF");
@@ -554,7 +556,8 @@ impl GlbBuilder {
             true => (MagFilter::Nearest, MinFilter::Nearest),
             false => (MagFilter::Linear, MinFilter::LinearMipmapLinear),
         };
-        let sampler = Sampler { mag_filter: Some(Valid(mag)), min_filter: Some(Valid(min)), ..Sampler::default() };
+        let sampler =
+            Sampler { mag_filter: Some(Valid(mag)), min_filter: Some(Valid(min)), ..Sampler::default() };
         let sampler = self.root.push(sampler);
         self.samplers.insert(nearest, id(sampler));
         sampler

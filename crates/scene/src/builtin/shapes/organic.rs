@@ -16,7 +16,10 @@ pub fn cloth(width: f32, height: f32, folds: f32, depth: f32, [nx, ny]: [u32; 2]
         let spread = 0.93 + 0.07 * t;
         let wander = 0.45 * value_noise(seed, Vec3::new(3.0 * s, 1.7 * t, 0.5));
         let phase = std::f32::consts::TAU * (folds * s + wander * (0.3 + t));
-        let amplitude = 0.5 * depth * (0.55 + 0.45 * t) * (1.0 + 0.35 * value_noise(seed ^ 77, Vec3::new(5.0 * s, t, 0.0)));
+        let amplitude = 0.5
+            * depth
+            * (0.55 + 0.45 * t)
+            * (1.0 + 0.35 * value_noise(seed ^ 77, Vec3::new(5.0 * s, t, 0.0)));
         let sway = 0.06 * depth * value_noise(seed ^ 5, Vec3::new(2.0 * s, 4.0 * t, 2.0));
         let z = amplitude * libm::sinf(phase) + sway;
         Vec3::new(width * (s - 0.5) * spread, -height * t, z)
@@ -25,10 +28,7 @@ pub fn cloth(width: f32, height: f32, folds: f32, depth: f32, [nx, ny]: [u32; 2]
     for j in 0..=ny {
         for i in 0..=nx {
             let (s, t) = (i as f32 / nx as f32, j as f32 / ny as f32);
-            let h = 1e-3;
-            let ds = surface(s + h, t) - surface(s - h, t);
-            let dt = surface(s, t + h) - surface(s, t - h);
-            g.vertex(surface(s, t), dt.cross(ds).normalize_or(Vec3::Z), Vec2::new(width * s, height * t));
+            g.vertex(surface(s, t), Vec3::Z, Vec2::new(width * s, height * t));
         }
     }
     for j in 0..ny {
@@ -39,7 +39,21 @@ pub fn cloth(width: f32, height: f32, folds: f32, depth: f32, [nx, ny]: [u32; 2]
             g.triangles.push([a, c, b]);
         }
     }
+    g.normals = smooth_normals(&g.positions, &g.triangles);
     g
+}
+
+/// Normals of vertices as the sum of the areas around them.
+fn smooth_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
+    let mut normals = vec![Vec3::ZERO; positions.len()];
+    for t in triangles {
+        let [a, b, c] = t.map(|i| positions[i as usize]);
+        let n = (b - a).cross(c - a);
+        for &i in t {
+            normals[i as usize] += n;
+        }
+    }
+    normals.into_iter().map(|n| n.normalize_or(Vec3::Z)).collect()
 }
 
 /// A rounded boulder of mean radius 1 about the origin: an icosphere of `20 · 4^level` triangles, displaced by noise.
@@ -47,15 +61,7 @@ pub fn cloth(width: f32, height: f32, folds: f32, depth: f32, [nx, ny]: [u32; 2]
 pub fn boulder(level: u32, seed: u32) -> Geometry {
     let (directions, triangles) = icosphere(level);
     let positions: Vec<Vec3> = directions.iter().map(|&d| d * boulder_radius(seed, d)).collect();
-    let mut normals = vec![Vec3::ZERO; positions.len()];
-    for t in &triangles {
-        let [a, b, c] = t.map(|i| positions[i as usize]);
-        let n = (b - a).cross(c - a);
-        for &i in t {
-            normals[i as usize] += n;
-        }
-    }
-    let normals: Vec<Vec3> = normals.iter().zip(&directions).map(|(n, &d)| n.normalize_or(d)).collect();
+    let normals = smooth_normals(&positions, &triangles);
     let uvs = positions.iter().map(|p| Vec2::new(p.x, -p.y)).collect();
     Geometry { positions, normals, uvs, triangles }
 }
@@ -84,9 +90,26 @@ fn icosphere(level: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
         points.push(Vec3::new(a, 0.0, b).normalize());
     }
     let mut triangles: Vec<[u32; 3]> = vec![
-        [0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11], [1, 5, 9], [5, 11, 4], [11, 10, 2], [10, 7, 6],
-        [7, 1, 8], [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8], [3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10],
-        [8, 6, 7], [9, 8, 1],
+        [0, 11, 5],
+        [0, 5, 1],
+        [0, 1, 7],
+        [0, 7, 10],
+        [0, 10, 11],
+        [1, 5, 9],
+        [5, 11, 4],
+        [11, 10, 2],
+        [10, 7, 6],
+        [7, 1, 8],
+        [3, 9, 4],
+        [3, 4, 2],
+        [3, 2, 6],
+        [3, 6, 8],
+        [3, 8, 9],
+        [4, 9, 5],
+        [2, 4, 11],
+        [6, 2, 10],
+        [8, 6, 7],
+        [9, 8, 1],
     ];
     for _ in 0..level.min(7) {
         let mut middles: BTreeMap<(u32, u32), u32> = BTreeMap::new();

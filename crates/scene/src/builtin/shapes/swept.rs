@@ -111,8 +111,7 @@ pub fn sweep(path: &[Frame], outline: &[Vec2], round: bool, closed: bool) -> Geo
             }
         }
         for i in 0..rings as u32 - 1 {
-            let (a0, a1, b0, b1) =
-                (first + 2 * i, first + 2 * i + 1, first + 2 * i + 2, first + 2 * i + 3);
+            let (a0, a1, b0, b1) = (first + 2 * i, first + 2 * i + 1, first + 2 * i + 2, first + 2 * i + 3);
             g.triangles.push([a0, a1, b1]);
             g.triangles.push([a0, b1, b0]);
         }
