@@ -65,7 +65,7 @@ pub struct Body {
     pub position: Vec3,
     /// Rotation at time 0.
     pub rotation: Quat,
-    /// Pushes in the order of time.
+    /// Pushes in the order of time; the body is held fast until the first.
     pub pushes: Vec<Push>,
 }
 
@@ -81,7 +81,7 @@ pub struct Motion {
 /// Lets bodies fall and roll for a number of samples after the first. Equal input gives equal bits on every machine.
 pub fn simulate(solids: &[Solid], bodies: &[Body], samples: u32) -> Vec<Motion> {
     let mut world = rapier::PhysicsWorld::new();
-    world.integration_parameters.set_dt(1.0 / STEPS_PER_SECOND as f32);
+    world.integration_parameters.dt = 1.0 / STEPS_PER_SECOND as f32;
     for solid in solids {
         let collider = match *solid {
             Solid::Box { min, max } => {
@@ -102,7 +102,10 @@ pub fn simulate(solids: &[Solid], bodies: &[Body], samples: u32) -> Vec<Motion> 
             let hull: Vec<rapier::Vector> = body.hull.iter().map(|&p| vector(p)).collect();
             let shape = rapier::ColliderBuilder::convex_hull(&hull)
                 .unwrap_or_else(|| rapier::ColliderBuilder::ball(body.radius));
-            let mut rigid = rapier::RigidBodyBuilder::dynamic().translation(vector(body.position)).build();
+            let mut rigid = rapier::RigidBodyBuilder::fixed()
+                .translation(vector(body.position))
+                .angular_damping(0.15)
+                .build();
             rigid.set_rotation(rapier::Rotation::from_xyzw(x, y, z, w), false);
             world.insert(rigid, shape.friction(0.8).restitution(0.3).density(2500.0)).0
         })
@@ -126,6 +129,7 @@ pub fn simulate(solids: &[Solid], bodies: &[Body], samples: u32) -> Vec<Motion> 
             for (body, &handle) in bodies.iter().zip(&handles) {
                 for push in body.pushes.iter().filter(|p| step_at(p.time) == step) {
                     let roll = Vec3::Y.cross(push.velocity) / body.radius;
+                    world.bodies[handle].set_body_type(rapier::RigidBodyType::Dynamic, true);
                     world.bodies[handle].set_linvel(vector(push.velocity), true);
                     world.bodies[handle].set_angvel(vector(roll), true);
                 }

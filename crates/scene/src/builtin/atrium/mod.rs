@@ -7,10 +7,10 @@ mod textures;
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
-use glam::{Quat, Vec2, Vec3};
+use glam::{Quat, Vec2, Vec3, Vec4};
 
 use super::builder::*;
-use super::shapes::{boulder, ring_slab};
+use super::shapes::{boulder, ring_slab, ring_slab_faces};
 use super::{BuiltinError, Detail, path, physics};
 use crate::LightKind;
 use motion::{FRAMES, ROCKS, SECONDS};
@@ -25,7 +25,7 @@ struct Palette {
     marble: MaterialId,
     plaster: MaterialId,
     floor: MaterialId,
-    gallery_floor: MaterialId,
+    wood_floor: MaterialId,
     wood: MaterialId,
     brass: MaterialId,
     terracotta: MaterialId,
@@ -60,6 +60,7 @@ fn palette(b: &mut GlbBuilder) -> Result<Palette, BuiltinError> {
     let floor = b.texture("floor", size, &textures::floor(), false)?;
     let stone = b.texture("stone", size, &textures::stone(), false)?;
     let wood = b.texture("wood", size, &textures::wood(), false)?;
+    let boards = b.texture("boards", size, &textures::boards(), false)?;
     let lattice = b.texture("lattice", size, &textures::lattice(), false)?;
     let textured =
         |texture, roughness| MaterialSpec { texture: Some(texture), roughness, ..Default::default() };
@@ -71,10 +72,13 @@ fn palette(b: &mut GlbBuilder) -> Result<Palette, BuiltinError> {
         |r: f32, g: f32, bl: f32| MaterialSpec { double_sided: true, ..MaterialSpec::matt(r, g, bl, 0.95) };
     Ok(Palette {
         stone: b.material("stone", &textured(stone, 0.85)),
-        marble: b.material("marble", &MaterialSpec::matt(0.74, 0.66, 0.54, 0.5)),
-        plaster: b.material("plaster", &MaterialSpec::matt(0.78, 0.71, 0.60, 0.95)),
+        marble: b.material("marble", &MaterialSpec::matt(0.64, 0.56, 0.45, 0.5)),
+        plaster: b.material("plaster", &MaterialSpec::matt(0.70, 0.62, 0.51, 0.95)),
         floor: b.material("floor", &textured(floor, 0.35)),
-        gallery_floor: b.material("gallery-floor", &MaterialSpec::matt(0.60, 0.50, 0.40, 0.6)),
+        wood_floor: b.material(
+            "wood-floor",
+            &MaterialSpec { base_color: Vec4::new(1.0, 0.95, 0.85, 1.0), ..textured(boards, 0.55) },
+        ),
         wood: b.material("wood", &textured(wood, 0.6)),
         brass: b.material("brass", &metal(0.80, 0.58, 0.27, 0.32)),
         terracotta: b.material("terracotta", &MaterialSpec::matt(0.52, 0.22, 0.11, 0.8)),
@@ -119,28 +123,29 @@ fn build_structure(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
     let room = b.mesh("room", &[(&floor, p.floor), (&walls, p.stone), (&ceiling, p.plaster)]);
     b.node("room", &NodeSpec::mesh_at(room, Vec3::ZERO, 0.0));
 
-    let slab = ring_slab(ROOM + Vec2::splat(0.05), WELL, [SLAB_BOTTOM, GALLERY]);
-    let slab = b.mesh("gallery-slab", &[(&slab, p.gallery_floor)]);
+    let faces = |faces| ring_slab_faces(ROOM + Vec2::splat(0.02), WELL, [SLAB_BOTTOM, GALLERY], faces);
+    let (boards, rest) = (faces([true, false, false, false]), faces([false, true, true, true]));
+    let slab = b.mesh("gallery-slab", &[(&boards, p.wood_floor), (&rest, p.plaster)]);
     b.node("gallery-slab", &NodeSpec::mesh_at(slab, Vec3::ZERO, 0.0));
-    let out = Vec2::splat(0.2);
+    let out = Vec2::splat(0.17);
     let beam = ring_slab(COLUMNS + out, COLUMNS - out, [BEAM_BOTTOM, CEILING + 0.05]);
     let beam = b.mesh("beam", &[(&beam, p.plaster)]);
     b.node("beam", &NodeSpec::mesh_at(beam, Vec3::ZERO, 0.0));
-    // Mouldings: bands that stand out from the slab's edge and from the beam.
+    // Mouldings: bands that stand out from the slab's edge and from the beam towards the hall.
     let mut bands =
-        ring_slab(WELL + Vec2::splat(0.1), WELL - Vec2::splat(0.07), [GALLERY - 0.13, GALLERY - 0.02]);
-    let mut band = |outer: f32, inner: f32, y0: f32, y1: f32| {
-        bands.append_at(
-            &ring_slab(COLUMNS + Vec2::splat(outer), COLUMNS - Vec2::splat(inner), [y0, y1]),
-            Vec3::ZERO,
-        );
-    };
-    band(0.24, 0.24, BEAM_BOTTOM + 0.28, BEAM_BOTTOM + 0.36);
-    band(0.27, 0.27, CEILING - 0.20, CEILING - 0.10);
-    band(0.33, 0.33, CEILING - 0.11, CEILING + 0.03);
+        ring_slab(WELL + Vec2::splat(0.02), WELL - Vec2::splat(0.07), [GALLERY - 0.13, GALLERY - 0.02]);
+    for (depth, y0, y1) in [
+        (0.04, BEAM_BOTTOM + 0.22, BEAM_BOTTOM + 0.29),
+        (0.06, CEILING - 0.19, CEILING - 0.09),
+        (0.11, CEILING - 0.10, CEILING + 0.02),
+    ] {
+        let face = COLUMNS - out;
+        bands
+            .append_at(&ring_slab(face + Vec2::splat(0.02), face - Vec2::splat(depth), [y0, y1]), Vec3::ZERO);
+    }
     let bands = b.mesh("mouldings", &[(&bands, p.marble)]);
     b.node("mouldings", &NodeSpec::mesh_at(bands, Vec3::ZERO, 0.0));
-    let beams = b.mesh("skylight-beams", &[(&parts::skylight_beams(), p.wood)]);
+    let beams = b.mesh("skylight-beams", &[(&parts::skylight_beams(detail), p.wood)]);
     b.node("skylight-beams", &NodeSpec::mesh_at(beams, Vec3::ZERO, 0.0));
 
     // Long arcades carry the corners; the short ones end inside them.
@@ -184,27 +189,32 @@ fn build_structure(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
         }
     }
 
-    let low = b.mesh("pilaster-lower", &[(&parts::pilaster(SLAB_BOTTOM), p.marble)]);
-    let high = b.mesh("pilaster-upper", &[(&parts::pilaster(CEILING - GALLERY), p.marble)]);
-    let mut pilaster = |p: Vec2, turn: f32| {
+    let low = b.mesh("pilaster-lower", &[(&parts::pilaster(SLAB_BOTTOM, detail), p.marble)]);
+    let high = b.mesh("pilaster-upper", &[(&parts::pilaster(CEILING - GALLERY, detail), p.marble)]);
+    let mut pilaster = |p: Vec2, turn: f32, upper: bool| {
         b.node("pilaster-lower", &NodeSpec::mesh_at(low, at(p, 0.0), turn));
-        b.node("pilaster-upper", &NodeSpec::mesh_at(high, at(p, GALLERY), turn));
+        if upper {
+            b.node("pilaster-upper", &NodeSpec::mesh_at(high, at(p, GALLERY), turn));
+        }
     };
     for i in 0..=6 {
         let x = -COLUMNS.x + BAY * i as f32;
-        pilaster(Vec2::new(x, -ROOM.y), 0.0);
-        pilaster(Vec2::new(x, ROOM.y), PI);
+        pilaster(Vec2::new(x, -ROOM.y), 0.0, i % 2 == 0);
+        pilaster(Vec2::new(x, ROOM.y), PI, i % 2 == 0);
     }
     for i in 0..=3 {
         let z = -COLUMNS.y + BAY * i as f32;
-        pilaster(Vec2::new(-ROOM.x, z), FRAC_PI_2);
-        pilaster(Vec2::new(ROOM.x, z), -FRAC_PI_2);
+        pilaster(Vec2::new(-ROOM.x, z), FRAC_PI_2, i % 3 == 0);
+        pilaster(Vec2::new(ROOM.x, z), -FRAC_PI_2, i % 3 == 0);
     }
 }
 
 fn build_furniture(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
-    let clay = b.mesh("vase-clay", &[(&parts::vase(detail), p.terracotta)]);
-    let glazed = b.mesh("vase-glazed", &[(&parts::vase(detail), p.glaze)]);
+    let fine = parts::vase([detail.facets(30, 8), detail.facets(4, 2)], detail);
+    let coarse = parts::vase([detail.facets(16, 6), detail.facets(2, 1)], detail);
+    let clay = b.mesh("vase-clay", &[(&fine, p.terracotta)]);
+    let glazed = b.mesh("vase-glazed", &[(&fine, p.glaze)]);
+    let jars = [p.terracotta, p.glaze, p.brass].map(|m| b.mesh("jar", &[(&coarse, m)]));
     let pots: Vec<MeshId> = (0..2)
         .map(|i| {
             b.mesh("pot", &[(&parts::pot(detail), p.terracotta), (&parts::leaves(70 + i, detail), p.leaf)])
@@ -213,11 +223,13 @@ fn build_furniture(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
     let earth =
         super::shapes::lathe(&[Vec2::new(0.35, 0.45), Vec2::new(0.35, 0.492), Vec2::new(0.0, 0.51)], 16);
     let earth = b.mesh("earth", &[(&earth, p.earth)]);
-    let crates = b.mesh("crate", &[(&parts::crate_box(), p.wood)]);
+    let crates = b.mesh("crate", &[(&parts::crate_box(detail), p.wood)]);
     let table = b.mesh("table", &[(&parts::table(detail), p.wood)]);
-    let bench = b.mesh("bench", &[(&parts::bench(), p.marble)]);
-    let screen =
-        b.mesh("lattice-screen", &[(&parts::screen_filling(), p.lattice), (&parts::screen_frame(), p.wood)]);
+    let bench = b.mesh("bench", &[(&parts::bench(detail), p.marble)]);
+    let screen = b.mesh(
+        "lattice-screen",
+        &[(&parts::screen_filling(), p.lattice), (&parts::screen_frame(detail), p.wood)],
+    );
     let mut put = |name: &str, mesh: MeshId, place: &Place| {
         let spec =
             NodeSpec { scale: Vec3::splat(place.scale), ..NodeSpec::mesh_at(mesh, place.at, place.turn) };
@@ -238,9 +250,8 @@ fn build_furniture(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
         // Small things on the table.
         for (i, along) in [-0.55_f32, 0.1, 0.42].into_iter().enumerate() {
             let offset = rotation_y(place.turn) * Vec3::new(along, 0.758, 0.18 * (i as f32 - 1.0));
-            let mesh = if i == 1 { glazed } else { clay };
             let scale = [0.42, 0.3, 0.24][i];
-            put("jar", mesh, &Place { at: place.at + offset, turn: 0.0, scale });
+            put("jar", jars[i], &Place { at: place.at + offset, turn: 0.0, scale });
         }
     }
     for place in BENCHES {
@@ -253,33 +264,29 @@ fn build_furniture(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
         b.mesh("fountain", &[(&parts::fountain(detail), p.marble), (&parts::water(detail), p.water)]);
     b.node("fountain", &NodeSpec::mesh_at(fountain, Vec3::ZERO, 0.0));
 
-    let door = b.mesh("door", &[(&parts::door(), p.wood)]);
+    let door = b.mesh("door", &[(&parts::door(detail), p.wood)]);
     for (x, z, y, turn) in [
         (-ROOM.x, 0.0, 0.0, FRAC_PI_2),
         (ROOM.x, 0.0, 0.0, -FRAC_PI_2),
-        (-3.9, -ROOM.y, 0.0, 0.0),
-        (3.9, ROOM.y, 0.0, PI),
-        (6.5, -ROOM.y, GALLERY, 0.0),
-        (-6.5, ROOM.y, GALLERY, PI),
+        (1.5 * BAY, ROOM.y, 0.0, PI),
+        (2.5 * BAY, -ROOM.y, GALLERY, 0.0),
+        (-2.5 * BAY, ROOM.y, GALLERY, PI),
     ] {
         b.node("door", &NodeSpec::mesh_at(door, Vec3::new(x, y, z), turn));
     }
-    let (frame, canvas) = (parts::picture_frame(1.3, 1.0), parts::picture_canvas(1.3, 1.0));
+    let (frame, canvas) = (parts::picture_frame(1.2, 0.9), parts::picture_canvas(1.2, 0.9));
     let pictures = p.canvases.map(|c| b.mesh("picture", &[(&frame, p.brass), (&canvas, c)]));
-    let eye = GALLERY + 1.75;
+    let eye = GALLERY + 1.6;
     for (i, (x, z, y, turn)) in [
-        (-3.9, -ROOM.y, eye, 0.0),
-        (1.3, -ROOM.y, eye, 0.0),
-        (3.9, -ROOM.y, eye + 0.1, 0.0),
-        (-1.3, ROOM.y, eye, PI),
-        (1.3, ROOM.y, eye + 0.1, PI),
-        (6.5, ROOM.y, eye, PI),
+        (-1.5 * BAY, -ROOM.y, eye, 0.0),
+        (0.5 * BAY, -ROOM.y, eye, 0.0),
+        (-0.5 * BAY, ROOM.y, eye, PI),
+        (1.5 * BAY, ROOM.y, eye + 0.1, PI),
         (-ROOM.x, 0.0, eye, FRAC_PI_2),
-        (ROOM.x, -2.6, eye, -FRAC_PI_2),
-        (1.3, -ROOM.y, 1.9, 0.0),
-        (-1.3, ROOM.y, 1.9, PI),
-        (-ROOM.x, -2.6, 1.9, FRAC_PI_2),
-        (ROOM.x, -2.6, 1.9, -FRAC_PI_2),
+        (ROOM.x, -BAY, eye, -FRAC_PI_2),
+        (0.5 * BAY, -ROOM.y, 1.8, 0.0),
+        (-0.5 * BAY, ROOM.y, 1.8, PI),
+        (ROOM.x, -BAY, 1.8, -FRAC_PI_2),
     ]
     .into_iter()
     .enumerate()
@@ -304,7 +311,7 @@ fn build_textiles(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
         // Behind the columns and the railing, as seen from the hall.
         let line = at(bay.center + bay.outward * 0.29, height);
         let along = rotation_y(bay.turn) * Vec3::X;
-        let width = [0.95, 1.25][which];
+        let width = [0.85, 1.1][which];
         let offset = along * (side * 0.5 * (BAY - 0.18 - width));
         b.node("curtain", &NodeSpec::mesh_at(curtains[which][color], line + offset, bay.turn));
         if rods.insert(index) {
@@ -314,9 +321,9 @@ fn build_textiles(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
     let banner = parts::banner(detail);
     let banners = p.cloths.map(|c| b.mesh("banner-cloth", &[(&banner, c)]));
     let short = b.mesh("banner-rod", &[(&parts::rod(0.52, detail), p.brass)]);
-    for (i, x) in [-5.2, 0.0, 5.2].into_iter().enumerate() {
+    for (i, x) in [-2.0 * BAY, 0.0, 2.0 * BAY].into_iter().enumerate() {
         for (side, turn) in [(1.0, PI), (-1.0, 0.0)] {
-            let z = side * (COLUMNS.y - 0.32);
+            let z = side * (COLUMNS.y - 0.36);
             let color = if side > 0.0 { [0, 2, 1][i] } else { [2, 0, 0][i] };
             b.node("banner", &NodeSpec::mesh_at(banners[color], Vec3::new(x, BEAM_BOTTOM + 0.2, z), turn));
             b.node("banner-rod", &NodeSpec::mesh_at(short, Vec3::new(x, BEAM_BOTTOM + 0.21, z), turn));
@@ -354,6 +361,7 @@ fn light(b: &mut GlbBuilder, p: &Palette, animation: AnimationId, detail: Detail
     }
 
     let housing = b.mesh("spot-housing", &[(&parts::spot_housing(detail), p.iron)]);
+    let stem = b.mesh("spot-stem", &[(&parts::spot_stem(CEILING - motion::SPOT_HEIGHT, detail), p.iron)]);
     let keys = 8 * SECONDS as u32;
     let times: Vec<f32> = (0..=keys).map(|i| i as f32 * SECONDS / keys as f32).collect();
     for (i, spot) in motion::spots().iter().enumerate() {
@@ -379,6 +387,7 @@ fn light(b: &mut GlbBuilder, p: &Palette, animation: AnimationId, detail: Detail
             ..NodeSpec::default()
         };
         let node = b.node(&name, &node);
+        b.node("spot-stem", &NodeSpec::mesh_at(stem, spot.at, 0.0));
         b.channel(animation, node, &times, Track::Rotation(&rotations), false);
     }
 }
@@ -435,3 +444,6 @@ fn place_cameras(b: &mut GlbBuilder, animation: AnimationId) {
         b.channel(animation, node, &times, Track::Rotation(&rotations), false);
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,47 +5,47 @@ use glam::{Vec2, Vec3};
 use crate::builtin::physics::Solid;
 
 /// Half extents of the room (x, z).
-pub(super) const ROOM: Vec2 = Vec2::new(10.8, 6.5);
+pub(super) const ROOM: Vec2 = Vec2::new(9.72, 5.85);
 /// Distance between neighbouring columns.
-pub(super) const BAY: f32 = 2.6;
+pub(super) const BAY: f32 = 2.34;
 /// Half extents of the rectangle on whose outline columns stand: six bays by three.
-pub(super) const COLUMNS: Vec2 = Vec2::new(7.8, 3.9);
+pub(super) const COLUMNS: Vec2 = Vec2::new(7.02, 3.51);
 /// Half extents of the opening in the gallery's floor.
-pub(super) const WELL: Vec2 = Vec2::new(7.45, 3.55);
+pub(super) const WELL: Vec2 = Vec2::new(6.67, 3.16);
 /// Half extents of the opening in the roof.
-pub(super) const SKYLIGHT: Vec2 = Vec2::new(6.6, 2.7);
+pub(super) const SKYLIGHT: Vec2 = Vec2::new(5.94, 2.43);
 /// Where the arches of the lower arcade begin.
-pub(super) const SPRING: f32 = 2.6;
+pub(super) const SPRING: f32 = 2.4;
 /// Radius of the arches.
-pub(super) const ARCH_RADIUS: f32 = 1.03;
+pub(super) const ARCH_RADIUS: f32 = 0.92;
 /// Thickness of the arcade's wall.
-pub(super) const ARCADE_THICKNESS: f32 = 0.44;
+pub(super) const ARCADE_THICKNESS: f32 = 0.42;
 /// Underside of the gallery's floor.
-pub(super) const SLAB_BOTTOM: f32 = 4.0;
+pub(super) const SLAB_BOTTOM: f32 = 3.64;
 /// The gallery's floor.
-pub(super) const GALLERY: f32 = 4.3;
+pub(super) const GALLERY: f32 = 3.88;
 /// Underside of the beam on the upper columns.
-pub(super) const BEAM_BOTTOM: f32 = 7.25;
+pub(super) const BEAM_BOTTOM: f32 = 6.6;
 /// The ceiling.
-pub(super) const CEILING: f32 = 8.2;
+pub(super) const CEILING: f32 = 7.3;
 /// Top of the curb around the roof's opening.
-pub(super) const CURB_TOP: f32 = 8.9;
+pub(super) const CURB_TOP: f32 = 7.85;
 /// Steps of a flight; the gallery's floor is one riser above the last.
 pub(super) const STEPS: u32 = 24;
 /// Height of a step.
 pub(super) const RISER: f32 = GALLERY / (STEPS + 1) as f32;
 /// Depth of a step.
-pub(super) const TREAD: f32 = 0.27;
+pub(super) const TREAD: f32 = 0.25;
 /// Width of a flight.
-pub(super) const STAIR_WIDTH: f32 = 1.9;
+pub(super) const STAIR_WIDTH: f32 = 1.7;
 /// The east flight's axis (z); the west flight is the east one turned by 180° about the vertical.
-pub(super) const STAIR_Z: f32 = 2.6;
+pub(super) const STAIR_Z: f32 = 2.34;
 /// Where the east flight starts (x).
 pub(super) const STAIR_FOOT_X: f32 = WELL.x - TREAD * STEPS as f32;
 /// Height of railings.
 pub(super) const RAIL_HEIGHT: f32 = 1.02;
 /// Radius and height of the fountain's basin in the middle of the hall.
-pub(super) const FOUNTAIN: [f32; 2] = [1.0, 0.46];
+pub(super) const FOUNTAIN: [f32; 2] = [0.92, 0.46];
 
 /// Positions (x, z) of the columns of one storey, clockwise from the north-west.
 pub(super) fn column_places() -> Vec<Vec2> {
@@ -110,53 +110,53 @@ const fn place(x: f32, y: f32, z: f32, turn: f32, scale: f32) -> Place {
 
 /// Slender vases (mesh height 0.9, radius 0.27).
 pub(super) const VASES: &[Place] = &[
-    place(-10.2, 0.0, -5.9, 0.3, 1.15),
-    place(10.2, 0.0, 5.9, 1.2, 1.2),
-    place(-5.2, 0.0, 6.0, 0.0, 1.0),
-    place(0.0, 0.0, -6.0, 2.0, 1.1),
-    place(7.0, 0.0, -3.0, 2.5, 0.85),
-    place(-7.0, 0.0, 3.0, 0.8, 0.9),
-    place(10.25, GALLERY, -3.9, 0.4, 1.0),
-    place(-10.25, GALLERY, 1.3, 1.4, 1.05),
-    place(2.6, GALLERY, -6.05, 0.0, 0.9),
-    place(-2.6, GALLERY, 6.05, 0.6, 1.0),
+    place(-9.18, 0.0, -5.31, 0.3, 1.15),
+    place(9.18, 0.0, 5.31, 1.2, 1.2),
+    place(-4.68, 0.0, 5.4, 0.0, 1.0),
+    place(0.0, 0.0, -5.4, 2.0, 1.1),
+    place(6.3, 0.0, -2.7, 2.5, 0.85),
+    place(-6.3, 0.0, 2.7, 0.8, 0.9),
+    place(9.225, GALLERY, -3.51, 0.4, 1.0),
+    place(-9.225, GALLERY, 1.17, 1.4, 1.05),
+    place(2.34, GALLERY, -5.445, 0.0, 0.9),
+    place(-2.34, GALLERY, 5.445, 0.6, 1.0),
 ];
 
 /// Wide pots (mesh height 0.55, radius 0.42).
 pub(super) const POTS: &[Place] = &[
-    place(10.15, 0.0, -5.85, 0.3, 1.1),
-    place(-10.2, 0.0, 5.85, 0.9, 1.0),
-    place(5.2, 0.0, -6.0, 0.0, 0.9),
-    place(6.85, 0.0, -2.2, 0.7, 0.75),
-    place(10.15, GALLERY, 5.8, 0.2, 1.0),
-    place(-10.15, GALLERY, -5.8, 1.9, 1.0),
+    place(9.135, 0.0, -5.265, 0.3, 1.1),
+    place(-9.18, 0.0, 5.265, 0.9, 1.0),
+    place(4.68, 0.0, -5.4, 0.0, 0.9),
+    place(6.165, 0.0, -1.98, 0.7, 0.75),
+    place(9.135, GALLERY, 5.22, 0.2, 1.0),
+    place(-9.135, GALLERY, -5.22, 1.9, 1.0),
 ];
 
 /// Crates (mesh 0.8 m cubes about the middle of their underside), some stacked.
 pub(super) const CRATES: &[Place] = &[
-    place(9.9, 0.0, 2.9, 0.12, 1.0),
-    place(9.95, 0.0, 1.95, -0.2, 0.9),
-    place(9.92, 0.8, 2.55, 0.5, 0.75),
-    place(-3.4, 0.0, -6.0, 0.06, 0.95),
-    place(-2.5, 0.0, -6.05, -0.3, 0.8),
-    place(-9.9, GALLERY, -2.6, 0.25, 0.8),
+    place(8.91, 0.0, 2.61, 0.12, 1.0),
+    place(8.955, 0.0, 1.755, -0.2, 0.9),
+    place(8.928, 0.8, 2.295, 0.5, 0.75),
+    place(-3.06, 0.0, -5.4, 0.06, 0.95),
+    place(-2.25, 0.0, -5.445, -0.3, 0.8),
+    place(-8.9, GALLERY, 4.0, 0.25, 0.8),
 ];
 
 /// Tables (mesh 1.8 × 0.8 m, 0.76 high).
 pub(super) const TABLES: &[Place] = &[
-    place(-8.0 + 14.3, 0.0, 5.75, 0.0, 1.0),
-    place(-9.95, 0.0, -0.4, std::f32::consts::FRAC_PI_2, 1.0),
-    place(-6.5, GALLERY, -5.9, 0.0, 1.0),
+    place(5.67, 0.0, 5.175, 0.0, 1.0),
+    place(-8.955, 0.0, -0.36, std::f32::consts::FRAC_PI_2, 1.0),
+    place(-5.85, GALLERY, -5.31, 0.0, 1.0),
 ];
 
 /// Benches (mesh 1.7 × 0.42 m, 0.45 high).
 pub(super) const BENCHES: &[Place] = &[
-    place(1.3, 0.0, 6.1, 0.0, 1.0),
-    place(6.5, 0.0, 4.95, 0.0, 0.9),
-    place(-6.4, 0.0, -6.1, 0.0, 1.0),
-    place(-9.2, 0.0, -0.4, std::f32::consts::FRAC_PI_2, 0.9),
-    place(3.9, GALLERY, 6.1, 0.0, 1.0),
-    place(10.4, GALLERY, 0.0, std::f32::consts::FRAC_PI_2, 1.0),
+    place(1.17, 0.0, 5.49, 0.0, 1.0),
+    place(5.85, 0.0, 4.455, 0.0, 0.9),
+    place(-5.76, 0.0, -5.49, 0.0, 1.0),
+    place(-8.2, 0.0, -0.36, std::f32::consts::FRAC_PI_2, 0.9),
+    place(3.51, GALLERY, 5.49, 0.0, 1.0),
+    place(9.36, GALLERY, 0.0, std::f32::consts::FRAC_PI_2, 1.0),
 ];
 
 /// Simplified solids of everything that stands still: what boulders collide with and cameras keep away from.
@@ -228,21 +228,21 @@ pub(super) fn solids() -> Vec<Solid> {
     }
     for screen in SCREENS {
         let thin = Vec2::new(
-            if screen.turn == 0.0 { 1.06 } else { 0.06 },
-            if screen.turn == 0.0 { 0.06 } else { 1.06 },
+            if screen.turn == 0.0 { 0.92 } else { 0.06 },
+            if screen.turn == 0.0 { 0.06 } else { 0.92 },
         );
         let a = screen.at;
-        solids.push(boxed(a.x - thin.x, a.y, a.z - thin.y, a.x + thin.x, a.y + 2.3, a.z + thin.y));
+        solids.push(boxed(a.x - thin.x, a.y, a.z - thin.y, a.x + thin.x, a.y + 2.0, a.z + thin.y));
     }
     solids
 }
 
 /// Lattice screens (mesh 2.1 × 2.3 m, standing along X).
 pub(super) const SCREENS: &[Place] = &[
-    place(-6.5, 0.0, 3.9, 0.0, 1.0),
-    place(6.5, 0.0, -3.9, 0.0, 1.0),
-    place(8.35, GALLERY, 0.0, std::f32::consts::FRAC_PI_2, 1.0),
-    place(-8.35, GALLERY, 0.0, std::f32::consts::FRAC_PI_2, 1.0),
+    place(-5.85, 0.0, 3.51, 0.0, 0.85),
+    place(5.85, 0.0, -3.51, 0.0, 0.85),
+    place(7.515, GALLERY, 0.0, std::f32::consts::FRAC_PI_2, 0.85),
+    place(-7.515, GALLERY, 0.0, std::f32::consts::FRAC_PI_2, 0.85),
 ];
 
 /// Curtains: bay index (of [`bays`]), which side of the bay (−1 or 1, 0 in the middle), colour (0 red, 1 green, 2 blue), mesh 0 or 1.
@@ -264,12 +264,12 @@ pub(super) const CURTAINS: &[(usize, f32, usize, usize)] = &[
 
 /// Lanterns: the hook's position; the light is 0.95 m below.
 pub(super) const LANTERNS: &[Vec3] = &[
-    Vec3::new(-9.3, SLAB_BOTTOM, 5.2),
-    Vec3::new(-2.6, SLAB_BOTTOM, 5.2),
-    Vec3::new(3.9, SLAB_BOTTOM, 5.2),
-    Vec3::new(9.3, SLAB_BOTTOM, 0.0),
-    Vec3::new(2.6, SLAB_BOTTOM, -5.2),
-    Vec3::new(-5.2, SLAB_BOTTOM, -5.2),
-    Vec3::new(9.3, CEILING, -5.2),
-    Vec3::new(-9.3, CEILING, 5.2),
+    Vec3::new(-8.37, SLAB_BOTTOM, 4.68),
+    Vec3::new(-2.34, SLAB_BOTTOM, 4.68),
+    Vec3::new(3.51, SLAB_BOTTOM, 4.68),
+    Vec3::new(8.37, SLAB_BOTTOM, 0.0),
+    Vec3::new(2.34, SLAB_BOTTOM, -4.68),
+    Vec3::new(-4.68, SLAB_BOTTOM, -4.68),
+    Vec3::new(8.37, CEILING, -4.68),
+    Vec3::new(-8.37, CEILING, 4.68),
 ];

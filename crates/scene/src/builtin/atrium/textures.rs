@@ -71,6 +71,20 @@ pub(super) fn wood() -> Vec<u8> {
     })
 }
 
+/// Light floor boards, eight a metre along v.
+pub(super) fn boards() -> Vec<u8> {
+    let board = SIZE / 8;
+    paint(|x, y| {
+        let row = x / board;
+        let along = (y + row * 97) % SIZE;
+        let own = (hash(19, row as i32, i32::from(along < SIZE / 2), 0) >> 16) as f32 / 65536.0 - 0.5;
+        let gap = if x % board < 1 || along % (SIZE / 2) < 1 { 0.5 } else { 1.0 };
+        let grain = tiling(37, x, y, [40.0, 3.0], 3);
+        let shade = (1.0 + 0.22 * own + 0.2 * grain) * gap;
+        [0.56 * shade, 0.40 * shade, 0.26 * shade, 1.0]
+    })
+}
+
 /// A lattice of crossed bars with eight-pointed openings, four a metre; alpha 0 in the openings.
 pub(super) fn lattice() -> Vec<u8> {
     let cell = SIZE as f32 / 4.0;

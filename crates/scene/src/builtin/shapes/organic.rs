@@ -28,10 +28,7 @@ pub fn cloth(width: f32, height: f32, folds: f32, depth: f32, [nx, ny]: [u32; 2]
     for j in 0..=ny {
         for i in 0..=nx {
             let (s, t) = (i as f32 / nx as f32, j as f32 / ny as f32);
-            let h = 1e-3;
-            let ds = surface(s + h, t) - surface(s - h, t);
-            let dt = surface(s, t + h) - surface(s, t - h);
-            g.vertex(surface(s, t), dt.cross(ds).normalize_or(Vec3::Z), Vec2::new(width * s, height * t));
+            g.vertex(surface(s, t), Vec3::Z, Vec2::new(width * s, height * t));
         }
     }
     for j in 0..ny {
@@ -42,7 +39,21 @@ pub fn cloth(width: f32, height: f32, folds: f32, depth: f32, [nx, ny]: [u32; 2]
             g.triangles.push([a, c, b]);
         }
     }
+    g.normals = smooth_normals(&g.positions, &g.triangles);
     g
+}
+
+/// Normals of vertices as the sum of the areas around them.
+fn smooth_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
+    let mut normals = vec![Vec3::ZERO; positions.len()];
+    for t in triangles {
+        let [a, b, c] = t.map(|i| positions[i as usize]);
+        let n = (b - a).cross(c - a);
+        for &i in t {
+            normals[i as usize] += n;
+        }
+    }
+    normals.into_iter().map(|n| n.normalize_or(Vec3::Z)).collect()
 }
 
 /// A rounded boulder of mean radius 1 about the origin: an icosphere of `20 · 4^level` triangles, displaced by noise.
@@ -50,15 +61,7 @@ pub fn cloth(width: f32, height: f32, folds: f32, depth: f32, [nx, ny]: [u32; 2]
 pub fn boulder(level: u32, seed: u32) -> Geometry {
     let (directions, triangles) = icosphere(level);
     let positions: Vec<Vec3> = directions.iter().map(|&d| d * boulder_radius(seed, d)).collect();
-    let mut normals = vec![Vec3::ZERO; positions.len()];
-    for t in &triangles {
-        let [a, b, c] = t.map(|i| positions[i as usize]);
-        let n = (b - a).cross(c - a);
-        for &i in t {
-            normals[i as usize] += n;
-        }
-    }
-    let normals: Vec<Vec3> = normals.iter().zip(&directions).map(|(n, &d)| n.normalize_or(d)).collect();
+    let normals = smooth_normals(&positions, &triangles);
     let uvs = positions.iter().map(|p| Vec2::new(p.x, -p.y)).collect();
     Geometry { positions, normals, uvs, triangles }
 }

@@ -1,0 +1,303 @@
+//! The atrium as a file: valid, closed, outward, the same twice; boulders and cameras where they should be.
+
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+
+use glam::{Mat4, Quat, Vec3};
+
+use super::motion::{self, FRAMES, SECONDS};
+use super::plan::{CEILING, ROOM, solids};
+use crate::builtin::{glb, path, physics};
+
+const DETAIL: f32 = 0.1;
+
+static SMALL: LazyLock<Vec<u8>> = LazyLock::new(|| glb("atrium", DETAIL).expect("the small atrium"));
+
+struct Doc {
+    gltf: gltf::Gltf,
+    bin: Vec<u8>,
+}
+
+fn read(bytes: &[u8]) -> Doc {
+    let mut gltf = gltf::Gltf::from_slice(bytes).expect("valid glTF");
+    let bin = gltf.blob.take().expect("a binary chunk");
+    Doc { gltf, bin }
+}
+
+fn triangle_count(doc: &Doc) -> usize {
+    let of_mesh = |m: gltf::Mesh<'_>| -> usize {
+        m.primitives().map(|p| p.indices().expect("indexed").count() / 3).sum()
+    };
+    doc.gltf.nodes().filter_map(|n| n.mesh()).map(of_mesh).sum()
+}
+
+/// Corners of all triangles of a mesh, with its normals.
+fn triangles(doc: &Doc, mesh: &gltf::Mesh<'_>) -> (Vec<[Vec3; 3]>, Vec<Vec3>) {
+    let (mut corners, mut normals) = (Vec::new(), Vec::new());
+    for primitive in mesh.primitives() {
+        let reader = primitive.reader(|_| Some(&doc.bin));
+        let positions: Vec<Vec3> = reader.read_positions().expect("positions").map(Vec3::from).collect();
+        let own: Vec<Vec3> = reader.read_normals().expect("normals").map(Vec3::from).collect();
+        assert_eq!(own.len(), positions.len());
+        assert_eq!(reader.read_tex_coords(0).expect("uvs").into_f32().count(), positions.len());
+        normals.extend(own);
+        let indices: Vec<u32> = reader.read_indices().expect("indices").into_u32().collect();
+        corners.extend(indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|i| positions[i as usize])));
+    }
+    (corners, normals)
+}
+
+/// Single layers, open on purpose.
+fn is_sheet(name: &str) -> bool {
+    ["room", "curtain", "banner-cloth", "lattice-screen"].contains(&name)
+}
+
+#[test]
+fn same_bytes_twice() {
+    assert!(glb("atrium", DETAIL).expect("again") == *SMALL);
+}
+
+#[test]
+fn triangle_counts_follow_detail() {
+    let full = triangle_count(&read(&glb("atrium", 1.0).expect("full atrium")));
+    let small = triangle_count(&read(&SMALL));
+    eprintln!("triangles: {full} at detail 1, {small} at detail {DETAIL}");
+    assert!((100_000..=300_000).contains(&full), "{full}");
+    assert!((3_000..=30_000).contains(&small), "{small}");
+}
+
+#[test]
+fn layout_does_not_depend_on_detail() {
+    let (a, b) = (read(&SMALL), read(&glb("atrium", 0.2).expect("atrium")));
+    let nodes = |d: &Doc| -> Vec<(String, Mat4)> {
+        let of = |n: gltf::Node<'_>| {
+            (n.name().unwrap_or("").to_string(), Mat4::from_cols_array_2d(&n.transform().matrix()))
+        };
+        d.gltf.nodes().map(of).collect()
+    };
+    assert_eq!(nodes(&a), nodes(&b));
+}
+
+#[test]
+fn meshes_are_closed_and_outward() {
+    for detail in [DETAIL, 1.0] {
+        let doc = read(&glb("atrium", detail).expect("atrium"));
+        for mesh in doc.gltf.meshes() {
+            let name = mesh.name().expect("named");
+            let (corners, normals) = triangles(&doc, &mesh);
+            for n in normals {
+                assert!((n.length() - 1.0).abs() < 1e-4, "{name}: normal {n}");
+            }
+            // Adding zero makes −0 equal to 0 in the keys.
+            let key = |p: Vec3| (p + Vec3::ZERO).to_array().map(f32::to_bits);
+            let mut edges: BTreeMap<_, i32> = BTreeMap::new();
+            let mut volume = 0.0_f64;
+            for t in &corners {
+                let [a, b, c] = *t;
+                assert!((b - a).cross(c - a).length() > 0.0, "{name}: a triangle without area at {a}");
+                volume += f64::from(a.dot(b.cross(c)));
+                for (p, q) in [(a, b), (b, c), (c, a)] {
+                    let (p, q) = (key(p), key(q));
+                    *edges.entry((p.min(q), p.max(q))).or_default() += if p < q { 1 } else { -1 };
+                }
+            }
+            if !is_sheet(name) {
+                let open = edges.iter().filter(|(_, balance)| **balance != 0).count();
+                assert_eq!(open, 0, "{name}: edges without their opposite, at detail {detail}");
+                assert!(volume > 0.0, "{name}: inside out");
+            }
+        }
+    }
+}
+
+#[test]
+fn vertex_normals_agree_with_faces() {
+    let doc = read(&SMALL);
+    for mesh in doc.gltf.meshes() {
+        for primitive in mesh.primitives() {
+            let reader = primitive.reader(|_| Some(&doc.bin));
+            let p: Vec<Vec3> = reader.read_positions().expect("positions").map(Vec3::from).collect();
+            let n: Vec<Vec3> = reader.read_normals().expect("normals").map(Vec3::from).collect();
+            let indices: Vec<u32> = reader.read_indices().expect("indices").into_u32().collect();
+            for t in indices.chunks_exact(3) {
+                let [a, b, c] = [t[0], t[1], t[2]].map(|i| i as usize);
+                let face = (p[b] - p[a]).cross(p[c] - p[a]).normalize();
+                assert!(
+                    face.dot(n[a] + n[b] + n[c]) > 0.0,
+                    "{:?}: a normal points inward at {}",
+                    mesh.name(),
+                    p[a]
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn one_animation_of_fifteen_seconds() {
+    let doc = read(&SMALL);
+    let animations: Vec<_> = doc.gltf.animations().collect();
+    assert_eq!(animations.len(), 1);
+    assert_eq!(animations[0].name(), Some("atrium"));
+    let mut end = 0.0_f32;
+    let mut animated = std::collections::BTreeSet::new();
+    for channel in animations[0].channels() {
+        animated.insert(channel.target().node().name().expect("named").to_string());
+        let times: Vec<f32> = channel.reader(|_| Some(&doc.bin)).read_inputs().expect("times").collect();
+        assert!(times.windows(2).all(|w| w[0] < w[1]) && times[0] == 0.0);
+        end = end.max(times[times.len() - 1]);
+    }
+    assert_eq!(end, SECONDS);
+    for name in ["path-walk", "path-gallery", "spot-0", "spot-2", "boulder-0", "boulder-7"] {
+        assert!(animated.contains(name), "{name} does not move");
+    }
+    let cameras = doc.gltf.nodes().filter(|n| n.camera().is_some()).count();
+    let lights: Vec<_> = doc.gltf.nodes().filter_map(|n| n.light()).map(|l| l.kind()).collect();
+    use gltf::khr_lights_punctual::Kind;
+    assert_eq!(cameras, 2);
+    assert_eq!(lights.iter().filter(|k| matches!(k, Kind::Directional)).count(), 1);
+    assert!(lights.iter().filter(|k| matches!(k, Kind::Spot { .. })).count() >= 3);
+    assert!(lights.iter().filter(|k| matches!(k, Kind::Point)).count() >= 3);
+}
+
+#[test]
+fn boulders_move_and_stay_inside() {
+    let bodies = motion::boulders();
+    assert!(bodies.len() >= 8);
+    let motions = physics::simulate(&solids(), &bodies, FRAMES);
+    let mut moving_seconds = 0.0;
+    for (i, (body, motion)) in bodies.iter().zip(&motions).enumerate() {
+        let mut way = 0.0;
+        let mut still = true;
+        for (k, (&position, &rotation)) in motion.positions.iter().zip(&motion.rotations).enumerate() {
+            let lowest = body.hull.iter().map(|&p| (position + rotation * p).y).fold(f32::INFINITY, f32::min);
+            assert!(lowest > -0.04, "boulder {i} is {lowest} m below the floor in frame {k}");
+            let room = ROOM - glam::Vec2::splat(0.8 * body.radius);
+            assert!(
+                position.x.abs() < room.x && position.z.abs() < room.y && position.y < CEILING,
+                "boulder {i} at {position} in frame {k}"
+            );
+            if k > 0 {
+                let step = position.distance(motion.positions[k - 1]);
+                assert!(step < 0.3, "boulder {i} jumps {step} m in frame {k}");
+                way += step;
+                if step > 0.3 / 60.0 {
+                    moving_seconds += 1.0 / 60.0;
+                    still = false;
+                }
+            }
+        }
+        assert!(!still && way > 2.0, "boulder {i} moves only {way} m");
+    }
+    let mean = moving_seconds / bodies.len() as f32;
+    eprintln!("{} boulders move faster than 0.3 m/s for {mean:.1} s on average", bodies.len());
+    assert!(mean > 4.0, "boulders move only {mean} s on average");
+}
+
+#[test]
+fn kept_keys_reproduce_all_frames() {
+    let bodies = motion::boulders();
+    let motions = physics::simulate(&solids(), &bodies, FRAMES);
+    for motion in &motions {
+        let kept = physics::thin_positions(&motion.positions, 0.0005);
+        for pair in kept.windows(2) {
+            for k in pair[0]..pair[1] {
+                let t = (k - pair[0]) as f32 / (pair[1] - pair[0]) as f32;
+                let p = motion.positions[pair[0]].lerp(motion.positions[pair[1]], t);
+                assert!(p.distance(motion.positions[k]) < 0.00051);
+            }
+        }
+        assert!(kept.len() < motion.positions.len());
+        let kept = physics::thin_rotations(&motion.rotations, 0.1_f32.to_radians());
+        for pair in kept.windows(2) {
+            for k in pair[0]..pair[1] {
+                let t = (k - pair[0]) as f32 / (pair[1] - pair[0]) as f32;
+                let q = motion.rotations[pair[0]].slerp(motion.rotations[pair[1]], t);
+                // For small angles the chord is half the angle.
+                assert!(2.0 * (q - motion.rotations[k]).length() < 0.101_f32.to_radians());
+            }
+        }
+    }
+}
+
+/// World corners of everything that stands still.
+fn still_triangles(doc: &Doc) -> Vec<[Vec3; 3]> {
+    let mut all = Vec::new();
+    for node in doc.gltf.nodes() {
+        let Some(mesh) = node.mesh() else { continue };
+        if node.name().is_some_and(|n| n.starts_with("boulder")) {
+            continue;
+        }
+        let world = Mat4::from_cols_array_2d(&node.transform().matrix());
+        let (corners, _) = triangles(doc, &mesh);
+        all.extend(corners.iter().map(|t| t.map(|p| world.transform_point3(p))));
+    }
+    all
+}
+
+fn point_triangle_distance(p: Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
+    let segment = |a: Vec3, b: Vec3| {
+        let t = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+        p.distance(a.lerp(b, t))
+    };
+    let n = (b - a).cross(c - a).normalize_or_zero();
+    let inside = [(a, b), (b, c), (c, a)].iter().all(|&(q, r)| (r - q).cross(p - q).dot(n) >= 0.0);
+    if inside { (p - a).dot(n).abs() } else { segment(a, b).min(segment(b, c)).min(segment(c, a)) }
+}
+
+#[test]
+fn cameras_keep_clear() {
+    const CLEARANCE: f32 = 0.3;
+    let doc = read(&SMALL);
+    let still = still_triangles(&doc);
+    let boxes: Vec<crate::Aabb> = still.iter().map(|t| crate::Aabb::from_points(*t)).collect();
+    let solids = solids();
+    let bodies = motion::boulders();
+    let motions = physics::simulate(&solids, &bodies, FRAMES);
+    for (name, (eye, look)) in [("walk", motion::walk()), ("flight", motion::flight())] {
+        let (positions, rotations) = path::fly(&eye, &look, FRAMES);
+        assert_eq!(positions.len(), FRAMES as usize + 1);
+        let (mut nearest, mut nearest_boulder, mut turn) = ((9.0_f32, 0), (9.0_f32, 0, 0), (0.0_f32, 0));
+        for (frame, &p) in positions.iter().enumerate() {
+            for solid in &solids {
+                let d = solid.distance(p);
+                assert!(d >= CLEARANCE, "{name}: frame {frame} at {p} is {d} m from {solid:?}");
+            }
+            for (t, b) in still.iter().zip(&boxes) {
+                if b.distance_squared(p) < nearest.0 * nearest.0 {
+                    let d = point_triangle_distance(p, *t);
+                    if d < nearest.0 {
+                        nearest = (d, frame);
+                    }
+                }
+            }
+            for (i, (body, motion)) in bodies.iter().zip(&motions).enumerate() {
+                let d = p.distance(motion.positions[frame]) - 1.1 * body.radius;
+                if d < nearest_boulder.0 {
+                    nearest_boulder = (d, frame, i);
+                }
+            }
+            if frame > 0 {
+                let angle = 2.0 * (rotations[frame] - rotations[frame - 1]).length();
+                if angle > turn.0 {
+                    turn = (angle, frame);
+                }
+                assert!(Quat::dot(rotations[frame - 1], rotations[frame]) > 0.0);
+            }
+        }
+        let speed = positions.windows(2).map(|w| w[0].distance(w[1])).sum::<f32>() / SECONDS;
+        eprintln!(
+            "{name}: {speed:.2} m/s, {:.2} m from geometry (frame {}), {:.2} m from boulder {} (frame {}), turns {:.1}°/s (frame {})",
+            nearest.0,
+            nearest.1,
+            nearest_boulder.0,
+            nearest_boulder.2,
+            nearest_boulder.1,
+            turn.0.to_degrees() * 60.0,
+            turn.1
+        );
+        assert!(nearest.0 >= CLEARANCE, "{name}: frame {} is {} m from geometry", nearest.1, nearest.0);
+        assert!(nearest_boulder.0 >= CLEARANCE, "{name}: frame {} meets a boulder", nearest_boulder.1);
+        assert!(turn.0.to_degrees() * 60.0 < 90.0, "{name}: turns too fast in frame {}", turn.1);
+    }
+}
