@@ -107,14 +107,3 @@ fn skins_and_big_meshes_are_valid() {
     let extras = gltf.nodes().last().and_then(|n| n.extras().as_ref().map(|e| e.get().to_string()));
     assert_eq!(extras.as_deref(), Some(r#"{"receives":false}"#));
 }
-
-#[test]
-fn dump() {
-    if let Ok(path) = std::env::var("DUMP") {
-        let t = std::time::Instant::now();
-        let d: f32 = std::env::var("DETAIL").unwrap().parse().unwrap();
-        let g = glb("atrium", d).unwrap();
-        eprintln!("{:?} {} bytes", t.elapsed(), g.len());
-        std::fs::write(path, g).unwrap();
-    }
-}

@@ -3,7 +3,9 @@
 mod motion;
 mod parts;
 mod plan;
+mod profile;
 mod textures;
+mod things;
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
@@ -210,25 +212,25 @@ fn build_structure(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
 }
 
 fn build_furniture(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
-    let fine = parts::vase([detail.facets(30, 8), detail.facets(4, 2)], detail);
-    let coarse = parts::vase([detail.facets(16, 6), detail.facets(2, 1)], detail);
+    let fine = things::vase([detail.facets(30, 8), detail.facets(4, 2)], detail);
+    let coarse = things::vase([detail.facets(16, 6), detail.facets(2, 1)], detail);
     let clay = b.mesh("vase-clay", &[(&fine, p.terracotta)]);
     let glazed = b.mesh("vase-glazed", &[(&fine, p.glaze)]);
     let jars = [p.terracotta, p.glaze, p.brass].map(|m| b.mesh("jar", &[(&coarse, m)]));
     let pots: Vec<MeshId> = (0..2)
         .map(|i| {
-            b.mesh("pot", &[(&parts::pot(detail), p.terracotta), (&parts::leaves(70 + i, detail), p.leaf)])
+            b.mesh("pot", &[(&things::pot(detail), p.terracotta), (&things::leaves(70 + i, detail), p.leaf)])
         })
         .collect();
     let earth =
         super::shapes::lathe(&[Vec2::new(0.35, 0.45), Vec2::new(0.35, 0.492), Vec2::new(0.0, 0.51)], 16);
     let earth = b.mesh("earth", &[(&earth, p.earth)]);
-    let crates = b.mesh("crate", &[(&parts::crate_box(detail), p.wood)]);
-    let table = b.mesh("table", &[(&parts::table(detail), p.wood)]);
-    let bench = b.mesh("bench", &[(&parts::bench(detail), p.marble)]);
+    let crates = b.mesh("crate", &[(&things::crate_box(detail), p.wood)]);
+    let table = b.mesh("table", &[(&things::table(detail), p.wood)]);
+    let bench = b.mesh("bench", &[(&things::bench(detail), p.marble)]);
     let screen = b.mesh(
         "lattice-screen",
-        &[(&parts::screen_filling(), p.lattice), (&parts::screen_frame(detail), p.wood)],
+        &[(&things::screen_filling(), p.lattice), (&things::screen_frame(detail), p.wood)],
     );
     let mut put = |name: &str, mesh: MeshId, place: &Place| {
         let spec =
@@ -261,7 +263,7 @@ fn build_furniture(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
         put("lattice-screen", screen, place);
     }
     let fountain =
-        b.mesh("fountain", &[(&parts::fountain(detail), p.marble), (&parts::water(detail), p.water)]);
+        b.mesh("fountain", &[(&things::fountain(detail), p.marble), (&things::water(detail), p.water)]);
     b.node("fountain", &NodeSpec::mesh_at(fountain, Vec3::ZERO, 0.0));
 
     let door = b.mesh("door", &[(&parts::door(detail), p.wood)]);
@@ -274,7 +276,7 @@ fn build_furniture(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
     ] {
         b.node("door", &NodeSpec::mesh_at(door, Vec3::new(x, y, z), turn));
     }
-    let (frame, canvas) = (parts::picture_frame(1.2, 0.9), parts::picture_canvas(1.2, 0.9));
+    let (frame, canvas) = (things::picture_frame(1.2, 0.9), things::picture_canvas(1.2, 0.9));
     let pictures = p.canvases.map(|c| b.mesh("picture", &[(&frame, p.brass), (&canvas, c)]));
     let eye = GALLERY + 1.6;
     for (i, (x, z, y, turn)) in [
@@ -297,11 +299,11 @@ fn build_furniture(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
 
 fn build_textiles(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
     let rod_half = 0.5 * BAY + 0.12;
-    let rod = b.mesh("rod", &[(&parts::rod(rod_half, detail), p.brass)]);
+    let rod = b.mesh("rod", &[(&things::rod(rod_half, detail), p.brass)]);
     let height = BEAM_BOTTOM - 0.16;
     let mut curtains = Vec::new();
     for which in 0..2 {
-        let cloth = parts::curtain(which, detail);
+        let cloth = things::curtain(which, detail);
         curtains.push(p.cloths.map(|c| b.mesh("curtain", &[(&cloth, c)])));
     }
     let bays = bays();
@@ -318,9 +320,9 @@ fn build_textiles(b: &mut GlbBuilder, p: &Palette, detail: Detail) {
             b.node("rod", &NodeSpec::mesh_at(rod, line + Vec3::Y * 0.01, bay.turn));
         }
     }
-    let banner = parts::banner(detail);
+    let banner = things::banner(detail);
     let banners = p.cloths.map(|c| b.mesh("banner-cloth", &[(&banner, c)]));
-    let short = b.mesh("banner-rod", &[(&parts::rod(0.52, detail), p.brass)]);
+    let short = b.mesh("banner-rod", &[(&things::rod(0.52, detail), p.brass)]);
     for (i, x) in [-2.0 * BAY, 0.0, 2.0 * BAY].into_iter().enumerate() {
         for (side, turn) in [(1.0, PI), (-1.0, 0.0)] {
             let z = side * (COLUMNS.y - 0.36);
@@ -350,8 +352,8 @@ fn light(b: &mut GlbBuilder, p: &Palette, animation: AnimationId, detail: Detail
         kind: LightKind::Point,
     };
     let lamp = b.light("lantern", &lamp);
-    let metal = b.mesh("lantern", &[(&parts::lantern_metal(detail), p.brass)]);
-    let glass = b.mesh("lantern-glass", &[(&parts::lantern_glass(detail), p.glow)]);
+    let metal = b.mesh("lantern", &[(&things::lantern_metal(detail), p.brass)]);
+    let glass = b.mesh("lantern-glass", &[(&things::lantern_glass(detail), p.glow)]);
     for &hook in LANTERNS {
         b.node("lantern", &NodeSpec::mesh_at(metal, hook, 0.0));
         b.node("lantern-glass", &NodeSpec { casts: false, ..NodeSpec::mesh_at(glass, hook, 0.0) });
@@ -360,8 +362,8 @@ fn light(b: &mut GlbBuilder, p: &Palette, animation: AnimationId, detail: Detail
         b.node("lantern-light", &NodeSpec { light: Some(lamp), translation, ..NodeSpec::default() });
     }
 
-    let housing = b.mesh("spot-housing", &[(&parts::spot_housing(detail), p.iron)]);
-    let stem = b.mesh("spot-stem", &[(&parts::spot_stem(CEILING - motion::SPOT_HEIGHT, detail), p.iron)]);
+    let housing = b.mesh("spot-housing", &[(&things::spot_housing(detail), p.iron)]);
+    let stem = b.mesh("spot-stem", &[(&things::spot_stem(CEILING - motion::SPOT_HEIGHT, detail), p.iron)]);
     let keys = 8 * SECONDS as u32;
     let times: Vec<f32> = (0..=keys).map(|i| i as f32 * SECONDS / keys as f32).collect();
     for (i, spot) in motion::spots().iter().enumerate() {

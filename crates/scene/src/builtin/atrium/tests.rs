@@ -57,13 +57,23 @@ fn same_bytes_twice() {
     assert!(glb("atrium", DETAIL).expect("again") == *SMALL);
 }
 
+/// Guards the promise of equal bytes on every machine. Renew the hash when the scene is changed on purpose (the failure
+/// message tells it); a change without that is a loss of determinism or a changed dependency.
+#[test]
+fn bytes_are_as_recorded() {
+    assert_eq!(
+        blake3::hash(&SMALL).to_hex().as_str(),
+        "9061cd8174b7a2159fce26a55f6a27b88f24598cc6dff9b930318431bc1cacc8"
+    );
+}
+
 #[test]
 fn triangle_counts_follow_detail() {
     let full = triangle_count(&read(&glb("atrium", 1.0).expect("full atrium")));
     let small = triangle_count(&read(&SMALL));
     eprintln!("triangles: {full} at detail 1, {small} at detail {DETAIL}");
     assert!((100_000..=300_000).contains(&full), "{full}");
-    assert!((3_000..=30_000).contains(&small), "{small}");
+    assert!((3_000..=40_000).contains(&small), "{small}");
 }
 
 #[test]
