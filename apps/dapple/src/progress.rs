@@ -23,17 +23,8 @@ impl Bar {
         self.0.set_position(position);
     }
 
-    pub(crate) fn add(&self, delta: u64) {
-        self.0.inc(delta);
-    }
-
     pub(crate) fn message(&self, what: &str) {
         self.0.set_message(what.to_owned());
-    }
-
-    /// Prints a line above the bar.
-    pub(crate) fn say(&self, line: &str) {
-        self.0.suspend(|| println!("{line}"));
     }
 }
 

@@ -7,7 +7,7 @@ use crate::args::{EvalArgs, Method, Size};
 use crate::source::{self, Loaded};
 
 /// The scene and detail of an evaluation without arguments.
-pub(super) const DEFAULT_SCENE: (&str, f32) = ("atrium", 0.3);
+pub(super) const DEFAULT_SCENE: (&str, f32) = ("atrium", 0.15);
 
 /// Frame times lie on a grid of this rate, whatever the server's rate.
 pub(super) const CLIENT_HZ: f64 = 60.0;
@@ -52,7 +52,7 @@ impl Settings {
             frame_times_s: frame_times(frames, seconds),
             size,
             supersample: args.supersample.unwrap_or(2),
-            points_per_m2: args.points.clone().unwrap_or_else(|| vec![512.0]),
+            points_per_m2: args.points.clone().unwrap_or_else(|| vec![if small { 256.0 } else { 512.0 }]),
             hz: args.hz.clone().unwrap_or_else(|| vec![15.0]),
             reference_rays: args.reference_rays.unwrap_or(if small { 128 } else { 512 }),
             radius_m,

@@ -6,20 +6,20 @@ use super::PointIndex;
 use super::index::Near;
 use crate::gbuffer::RestSurface;
 
-/// Parameters of the fit. Defaults were chosen on one pose of one scene and confirmed on others (`docs/evaluation.md`).
+/// Parameters of the fit. How the defaults were chosen stands in `docs/evaluation.md`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MovingLeastSquares {
-    /// Radius of the weights in units of the layout's spacing r0. Default 1.75.
+    /// Radius of the weights in units of the layout's spacing r0. Default 2.
     pub radius: f32,
-    /// Exponent of the cosine between normals, a power of two ≥ 1. Default 8.
+    /// Exponent of the cosine between normals, a power of two ≥ 1. Default 16.
     pub normal_power: u32,
-    /// How fast the weight falls with the distance from the fragment's tangent plane: 1 / (1 + k (h/r)²)². Default 32.
+    /// How fast the weight falls with the distance from the fragment's tangent plane: 1 / (1 + k (h/r)²)². Default 128.
     pub plane: f32,
 }
 
 impl Default for MovingLeastSquares {
     fn default() -> Self {
-        MovingLeastSquares { radius: 1.75, normal_power: 8, plane: 32.0 }
+        MovingLeastSquares { radius: 2.0, normal_power: 16, plane: 128.0 }
     }
 }
 

@@ -50,6 +50,9 @@ impl Default for GenerateParams {
     }
 }
 
+/// After so many rays of the inside test, a share of back faces that is this far from the limit decides.
+const SETTLED: [(usize, f64); 3] = [(8, 0.5), (16, 0.25), (32, 0.15)];
+
 /// What generation gives.
 #[derive(Clone, Debug)]
 pub struct GeneratedPoints {
@@ -265,33 +268,46 @@ impl LaidInstance {
             return;
         }
         let instance = self.instance;
-        let counts = |hit: u32| match moving[instance] {
-            true => hit as usize == instance,
-            false => !moving[hit as usize],
+        // Whether the back of an instance's surface can mean "inside" for these points.
+        let counts: Vec<bool> = (0..scene.instances.len())
+            .map(|other| {
+                let moves_along = if moving[instance] { other == instance } else { !moving[other] };
+                let mesh = &scene.meshes[scene.instances[other].mesh as usize];
+                moves_along && mesh.parts.iter().any(|p| !scene.materials[p.material as usize].double_sided)
+            })
+            .collect();
+        if !counts.contains(&true) {
+            return;
+        }
+        let is_back = |origin_world: Vec3, direction_world: Vec3| {
+            let hit = tracer.closest_hit(&Ray { origin_world, direction_world, t_max: f32::MAX });
+            hit.is_some_and(|hit| {
+                hit.back_face && counts[hit.instance as usize] && {
+                    let mesh = &scene.meshes[scene.instances[hit.instance as usize].mesh as usize];
+                    !scene.materials[mesh.material_of(hit.triangle) as usize].double_sided
+                }
+            })
         };
-        let is_inside = |point: &LaidPoint| {
+        let is_inside = |directions: &mut Vec<Vec3>, point: &LaidPoint| {
             let Some(posed) = point.anchor.pose(scene, pose, instance) else { return false };
             let origin_world = offset_origin(posed.position, posed.normal);
             let (tangent, bitangent) = orthonormal_basis(posed.normal);
-            let mut directions = Vec::new();
-            fixed_pattern(rays, point.anchor.site(instance as u32), &mut directions);
-            let mut back_faces = 0;
-            for d in directions {
-                let direction_world = tangent * d.x + bitangent * d.y + posed.normal * d.z;
-                let hit = tracer.closest_hit(&Ray { origin_world, direction_world, t_max: f32::MAX });
-                if let Some(hit) = hit
-                    && hit.back_face
-                    && counts(hit.instance)
-                {
-                    let mesh = &scene.meshes[scene.instances[hit.instance as usize].mesh as usize];
-                    if !scene.materials[mesh.material_of(hit.triangle) as usize].double_sided {
-                        back_faces += 1;
-                    }
+            fixed_pattern(rays, point.anchor.site(instance as u32), directions);
+            let mut back_faces = 0u32;
+            for (shot, d) in directions.iter().enumerate() {
+                // Each prefix of a pattern covers the hemisphere evenly, so a share that is far from the limit
+                // after a few rays will not cross it.
+                let share = f64::from(back_faces) / shot.max(1) as f64;
+                let limit = f64::from(params.inside_fraction);
+                if SETTLED.iter().any(|&(rays, margin)| shot == rays && (share - limit).abs() >= margin) {
+                    return share > limit;
                 }
+                let direction_world = tangent * d.x + bitangent * d.y + posed.normal * d.z;
+                back_faces += u32::from(is_back(origin_world, direction_world));
             }
             back_faces as f32 > params.inside_fraction * rays as f32
         };
-        let inside: Vec<bool> = self.points.par_iter().map(is_inside).collect();
+        let inside: Vec<bool> = self.points.par_iter().map_init(Vec::new, is_inside).collect();
         let before = self.points.len();
         let mut inside = inside.into_iter();
         self.points.retain(|_| !inside.next().unwrap_or(false));
