@@ -19,6 +19,17 @@ impl Bar {
         Bar(bar)
     }
 
+    /// A turning wheel, for work whose length is not known.
+    pub(crate) fn spinner(what: &str) -> Bar {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10));
+        let style = ProgressStyle::with_template("{spinner} {msg}  {elapsed}")
+            .unwrap_or_else(|_| ProgressStyle::default_spinner());
+        bar.set_style(style);
+        bar.set_message(what.to_owned());
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Bar(bar)
+    }
+
     pub(crate) fn set(&self, position: u64) {
         self.0.set_position(position);
     }

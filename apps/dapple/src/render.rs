@@ -31,7 +31,9 @@ pub(crate) fn run(args: &RenderArgs) -> Result<()> {
         supersample: args.supersample,
         shade: Default::default(),
     };
+    let wheel = Bar::spinner("drawing");
     let drawn = draw(scene, &camera, args.time, &params)?;
+    drop(wheel);
     let picture = match args.view {
         View::Normal => view_normals(&drawn.gbuffer, scene, &drawn.pose, NormalSpace::World),
         View::Points => points_view(args, &loaded, &drawn, &camera)?,

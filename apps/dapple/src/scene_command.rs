@@ -7,6 +7,7 @@ use dapple_scene::builtin;
 
 use crate::args::SceneArgs;
 use crate::picture::write_file;
+use crate::progress::Bar;
 
 pub(crate) fn run(args: &SceneArgs) -> Result<()> {
     let Some(name) = &args.name else {
@@ -15,7 +16,9 @@ pub(crate) fn run(args: &SceneArgs) -> Result<()> {
         }
         return Ok(());
     };
+    let wheel = Bar::spinner(&format!("making {name}"));
     let bytes = builtin::glb(name, args.detail)?;
+    drop(wheel);
     let output = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}.glb")));
     write_file(&output, &bytes)?;
     println!("wrote {} ({:.1} MB)", output.display(), bytes.len() as f64 / 1e6);

@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail};
 use dapple_scene::{CameraPath, Files, Scene, builtin};
 
 use crate::args::{CameraText, Radius, SceneChoice, VisibilityArgs};
+use crate::progress::Bar;
 
 /// The largest scene file that is read.
 const MAX_SCENE_BYTES: u64 = 4 << 30;
@@ -39,6 +40,7 @@ pub(crate) fn load(choice: &SceneChoice, fallback: Option<(&str, f32)>) -> Resul
 }
 
 fn load_builtin(name: &str, detail: f32) -> Result<(Scene, String)> {
+    let _wheel = Bar::spinner(&format!("making {name}"));
     let bytes = builtin::glb(name, detail)?;
     let scene = dapple_scene::load(&format!("{name}.glb"), &bytes, &dapple_scene::NoFiles)
         .with_context(|| format!("the built-in scene {name} does not load"))?;
@@ -46,6 +48,7 @@ fn load_builtin(name: &str, detail: f32) -> Result<(Scene, String)> {
 }
 
 fn load_file(path: &Path) -> Result<Scene> {
+    let _wheel = Bar::spinner(&format!("loading {}", path.display()));
     let bytes = read_limited(path, MAX_SCENE_BYTES)
         .with_context(|| format!("cannot read the scene {}", path.display()))?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();

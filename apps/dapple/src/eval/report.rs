@@ -102,7 +102,7 @@ fn frame(page: &mut String, results: &Results, number: usize, time_s: f64) {
             &[
                 ("picture", beauty),
                 ("visibility", visibility),
-                ("error of visibility: blue too dark, red too bright, full color at 0.25", error),
+                ("error of visibility: blue too dark, orange too bright, full color at 0.25", error),
             ],
         );
     }
