@@ -53,19 +53,15 @@ pub enum LoadError {
         /// What to do.
         remedy: &'static str,
     },
-    /// A JSON value of the wrong type.
-    #[error(
-        "{file}: {at} must be {expected}, but is {found}; export the file again with another tool, or mend it"
-    )]
-    WrongType {
+    /// JSON, but not as glTF lays it out: a value of the wrong type, or one that is absent.
+    #[error("{file}: {at}: {problem}; export the file again with another tool, or mend it")]
+    Schema {
         /// The scene file.
         file: String,
-        /// Which value.
+        /// Which value: a path such as `meshes[0].primitives`.
         at: String,
-        /// What it should be.
-        expected: &'static str,
-        /// What it is.
-        found: String,
+        /// The parser's complaint, with line and column where it knows them.
+        problem: String,
     },
     /// A property that glTF demands is absent.
     #[error("{file}: {at} has no {property}, which glTF demands; export the file again, or add it")]

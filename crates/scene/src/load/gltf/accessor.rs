@@ -1,72 +1,36 @@
 //! Checked access to numbers in buffers: every byte range is proved to exist before anything is read.
 
+use gltf::json::accessor::{Accessor, ComponentType, IndexComponentType, Type, sparse};
+use gltf::json::validation::Checked;
+use gltf::json::{Index, buffer};
+
 use super::document::Document;
-use super::json::Object;
 use crate::load::LoadError;
-
-/// Type of one number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Component {
-    I8,
-    U8,
-    I16,
-    U16,
-    U32,
-    F32,
-}
-
-impl Component {
-    fn from_code(code: u64) -> Option<Component> {
-        Some(match code {
-            5120 => Component::I8,
-            5121 => Component::U8,
-            5122 => Component::I16,
-            5123 => Component::U16,
-            5125 => Component::U32,
-            5126 => Component::F32,
-            _ => return None,
-        })
-    }
-
-    fn size_bytes(self) -> usize {
-        match self {
-            Component::I8 | Component::U8 => 1,
-            Component::I16 | Component::U16 => 2,
-            Component::U32 | Component::F32 => 4,
-        }
-    }
-}
-
-/// Numbers in an element: `SCALAR` to `MAT4`.
-fn width_of(name: &str) -> Option<usize> {
-    Some(match name {
-        "SCALAR" => 1,
-        "VEC2" => 2,
-        "VEC3" => 3,
-        "VEC4" | "MAT2" => 4,
-        "MAT3" => 9,
-        "MAT4" => 16,
-        _ => return None,
-    })
-}
 
 /// What an attribute may be made of.
 #[derive(Clone, Copy)]
 pub(super) struct Allowed {
-    pub(super) types: &'static [&'static str],
-    pub(super) components: &'static [Component],
+    pub(super) types: &'static [Type],
+    pub(super) components: &'static [ComponentType],
 }
 
 impl Allowed {
-    pub(super) const fn new(types: &'static [&'static str], components: &'static [Component]) -> Self {
+    pub(super) const fn new(types: &'static [Type], components: &'static [ComponentType]) -> Self {
         Allowed { types, components }
     }
 }
 
 /// Everything that can be read at all.
 pub(super) const ANY: Allowed = Allowed::new(
-    &["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"],
-    &[Component::I8, Component::U8, Component::I16, Component::U16, Component::U32, Component::F32],
+    &[Type::Scalar, Type::Vec2, Type::Vec3, Type::Vec4, Type::Mat2, Type::Mat3, Type::Mat4],
+    &[
+        ComponentType::I8,
+        ComponentType::U8,
+        ComponentType::I16,
+        ComponentType::U16,
+        ComponentType::U32,
+        ComponentType::F32,
+    ],
 );
 
 /// A strided run of elements inside a buffer.
@@ -80,13 +44,13 @@ struct Strided<'a> {
 struct Sparse<'a> {
     count: usize,
     index_bytes: &'a [u8],
-    index_component: Component,
+    index_component: ComponentType,
     values: Strided<'a>,
 }
 
 impl Sparse<'_> {
     fn index(&self, i: usize) -> u32 {
-        read_uint(self.index_component, self.index_bytes, i * self.index_component.size_bytes())
+        read_uint(self.index_component, self.index_bytes, i * self.index_component.size())
     }
 
     /// Where the values hold a replacement for element `element`.
@@ -106,7 +70,7 @@ pub(super) struct Elements<'a> {
     pub(super) at: String,
     pub(super) count: usize,
     pub(super) width: usize,
-    pub(super) component: Component,
+    pub(super) component: ComponentType,
     normalized: bool,
     base: Option<Strided<'a>>,
     sparse: Option<Sparse<'a>>,
@@ -117,15 +81,15 @@ impl Elements<'_> {
     pub(super) fn float(&self, i: usize, c: usize) -> f32 {
         let Some((bytes, offset)) = self.locate(i, c) else { return 0.0 };
         match self.component {
-            Component::F32 => f32::from_bits(read_uint(Component::U32, bytes, offset)),
-            Component::U32 => read_uint(Component::U32, bytes, offset) as f32,
-            Component::U8 => self.scaled(read_uint(Component::U8, bytes, offset) as f32, 255.0),
-            Component::U16 => self.scaled(read_uint(Component::U16, bytes, offset) as f32, 65535.0),
-            Component::I8 => {
-                self.scaled(f32::from(read_uint(Component::U8, bytes, offset) as u8 as i8), 127.0)
+            ComponentType::F32 => f32::from_bits(read_uint(ComponentType::U32, bytes, offset)),
+            ComponentType::U32 => read_uint(ComponentType::U32, bytes, offset) as f32,
+            ComponentType::U8 => self.scaled(read_uint(ComponentType::U8, bytes, offset) as f32, 255.0),
+            ComponentType::U16 => self.scaled(read_uint(ComponentType::U16, bytes, offset) as f32, 65535.0),
+            ComponentType::I8 => {
+                self.scaled(f32::from(read_uint(ComponentType::U8, bytes, offset) as u8 as i8), 127.0)
             }
-            Component::I16 => {
-                self.scaled(f32::from(read_uint(Component::U16, bytes, offset) as u16 as i16), 32767.0)
+            ComponentType::I16 => {
+                self.scaled(f32::from(read_uint(ComponentType::U16, bytes, offset) as u16 as i16), 32767.0)
             }
         }
     }
@@ -143,8 +107,8 @@ impl Elements<'_> {
     /// What integers that lack their `normalized` flag must be divided by where only fractions make sense.
     pub(super) fn integer_scale(&self) -> f32 {
         match self.component {
-            Component::U8 if !self.normalized => 255.0,
-            Component::U16 if !self.normalized => 65535.0,
+            ComponentType::U8 if !self.normalized => 255.0,
+            ComponentType::U16 if !self.normalized => 65535.0,
             _ => 1.0,
         }
     }
@@ -154,7 +118,7 @@ impl Elements<'_> {
     }
 
     fn locate(&self, i: usize, c: usize) -> Option<(&[u8], usize)> {
-        let within = c * self.component.size_bytes();
+        let within = c * self.component.size();
         if let Some(sparse) = &self.sparse
             && let Some(k) = sparse.find(i)
         {
@@ -165,9 +129,9 @@ impl Elements<'_> {
 }
 
 /// Reads an unsigned integer; bytes past the end (excluded when the elements were made) read as 0.
-fn read_uint(component: Component, bytes: &[u8], offset: usize) -> u32 {
+fn read_uint(component: ComponentType, bytes: &[u8], offset: usize) -> u32 {
     let at = |i: usize| u32::from(bytes.get(offset + i).copied().unwrap_or(0));
-    match component.size_bytes() {
+    match component.size() {
         1 => at(0),
         2 => at(0) | at(1) << 8,
         _ => match bytes.get(offset..).and_then(|b| b.first_chunk::<4>()) {
@@ -177,91 +141,86 @@ fn read_uint(component: Component, bytes: &[u8], offset: usize) -> u32 {
     }
 }
 
-impl<'a> Document<'a> {
-    /// Checks accessor `index` for a use at `at` and gives access to its elements.
+impl Document<'_> {
+    /// Checks an accessor for a use at `at` and gives access to its elements.
     pub(super) fn elements(
         &self,
-        index: usize,
+        index: Index<Accessor>,
         at: String,
         allowed: Allowed,
     ) -> Result<Elements<'_>, LoadError> {
-        let accessor = &self.accessors[index];
+        let index = self.resolve(index, "accessor", || at.clone())?;
+        let accessor = &self.root.accessors[index];
         let at = format!("{at} (accessor {index})");
-        let count = accessor.uint("count")?.ok_or_else(|| accessor.missing("count"))?;
-        let code = accessor.uint("componentType")?.ok_or_else(|| accessor.missing("componentType"))?;
-        let type_name = accessor.string("type")?.ok_or_else(|| accessor.missing("type"))?;
-        let component = Component::from_code(code).filter(|c| allowed.components.contains(c));
-        let width = width_of(type_name).filter(|_| allowed.types.contains(&type_name));
-        let (Some(component), Some(width)) = (component, width) else {
-            let type_name: String = type_name.chars().take(20).collect();
-            return Err(self.context.invalid(
-                at,
-                format!(
-                    "holds {type_name} of component type {code}, but must hold {} of {:?}; export the file again",
-                    allowed.types.join(" or "),
-                    allowed.components
-                ),
-            ));
+        let (Checked::Valid(kind), Checked::Valid(component)) = (accessor.type_, accessor.component_type)
+        else {
+            let problem = "its type or componentType is none of glTF's; export the file again";
+            return Err(self.context.invalid(at, problem));
         };
-        let count = usize::try_from(count).map_err(|_| self.context.truncated(at.as_str(), count, 0))?;
-        let element_bytes = width * component.size_bytes();
-        let base = match accessor.index("bufferView", "buffer view", self.views.len())? {
-            Some(view) => Some(self.strided(view, accessor, count, element_bytes, &at)?),
-            None => None,
-        };
-        let sparse = match accessor.object("sparse")? {
-            Some(sparse) => Some(self.sparse(&sparse, count, element_bytes, &at)?),
-            None => None,
-        };
-        let normalized = accessor.bool("normalized")?.unwrap_or(false);
-        Ok(Elements { at, count, width, component, normalized, base, sparse })
+        let component = component.0;
+        if !allowed.types.contains(&kind) || !allowed.components.contains(&component) {
+            let types: Vec<String> = allowed.types.iter().map(|kind| format!("{kind:?}")).collect();
+            let problem = format!(
+                "holds {kind:?} of {component:?}, but must hold {} of {:?}; export the file again",
+                types.join(" or "),
+                allowed.components
+            );
+            return Err(self.context.invalid(at, problem));
+        }
+        let count = usize::try_from(accessor.count.0)
+            .map_err(|_| self.context.truncated(at.as_str(), accessor.count.0, 0))?;
+        let width = kind.multiplicity();
+        let element_bytes = width * component.size();
+        let offset = accessor.byte_offset.map_or(0, |offset| offset.0);
+        let strided = |view| self.strided(view, offset, count, element_bytes, &at);
+        let base = accessor.buffer_view.map(strided).transpose()?;
+        let sparse =
+            accessor.sparse.as_ref().map(|s| self.sparse(s, count, element_bytes, &at)).transpose()?;
+        Ok(Elements { at, count, width, component, normalized: accessor.normalized, base, sparse })
     }
 
     fn sparse(
         &self,
-        sparse: &Object<'_>,
+        sparse: &sparse::Sparse,
         count: usize,
         element_bytes: usize,
         at: &str,
     ) -> Result<Sparse<'_>, LoadError> {
-        let replaced = sparse.uint("count")?.ok_or_else(|| sparse.missing("count"))?;
+        let invalid = |problem: String| {
+            self.context.invalid(format!("{at}.sparse"), format!("{problem}; export the file again"))
+        };
+        let replaced = sparse.count.0;
         if replaced > count as u64 {
-            let problem = format!("replaces {replaced} of {count} elements; export the file again");
-            return Err(sparse.invalid(problem));
+            return Err(invalid(format!("replaces {replaced} of {count} elements")));
         }
         let replaced = replaced as usize;
-        let indices = sparse.object("indices")?.ok_or_else(|| sparse.missing("indices"))?;
-        let values = sparse.object("values")?.ok_or_else(|| sparse.missing("values"))?;
-        let index_component = match indices.uint("componentType")?.and_then(Component::from_code) {
-            Some(c @ (Component::U8 | Component::U16 | Component::U32)) => c,
-            _ => {
-                return Err(
-                    indices.invalid("componentType must be 5121, 5123 or 5125; export the file again")
-                );
-            }
+        let (indices, values) = (&sparse.indices, &sparse.values);
+        let Checked::Valid(IndexComponentType(index_component)) = indices.component_type else {
+            return Err(invalid("the componentType of its indices must be 5121, 5123 or 5125".to_owned()));
         };
-        let view = |object: &Object<'_>| {
-            object
-                .index("bufferView", "buffer view", self.views.len())?
-                .ok_or_else(|| object.missing("bufferView"))
-        };
-        let index_size = index_component.size_bytes();
+        let index_at = format!("{at}.sparse.indices");
+        let index_size = index_component.size();
         let found =
-            self.strided(view(&indices)?, &indices, replaced, index_size, &format!("{at}.sparse.indices"))?;
-        let values =
-            self.strided(view(&values)?, &values, replaced, element_bytes, &format!("{at}.sparse.values"))?;
+            self.strided(indices.buffer_view, indices.byte_offset.0, replaced, index_size, &index_at)?;
+        let values = self.strided(
+            values.buffer_view,
+            values.byte_offset.0,
+            replaced,
+            element_bytes,
+            &format!("{at}.sparse.values"),
+        )?;
         if replaced > 0 && found.stride != index_size {
-            return Err(indices.invalid("its buffer view must not be strided; export the file again"));
+            return Err(invalid("the buffer view of its indices must not be strided".to_owned()));
         }
         let sparse = Sparse { count: replaced, index_bytes: found.bytes, index_component, values };
         let mut previous = None;
         for i in 0..replaced {
             let index = sparse.index(i);
             if previous.is_some_and(|p| p >= index) {
-                return Err(indices.invalid(format!("entry {i} does not increase; export the file again")));
+                return Err(invalid(format!("entry {i} of its indices does not increase")));
             }
             if index as usize >= count {
-                let at = format!("{at}.sparse.indices, entry {i},");
+                let at = format!("{index_at}, entry {i},");
                 return Err(self.context.out_of_range(at, "element", u64::from(index), count));
             }
             previous = Some(index);
@@ -269,17 +228,16 @@ impl<'a> Document<'a> {
         Ok(sparse)
     }
 
-    /// The bytes of `count` elements in a buffer view, from the `byteOffset` of `object`.
+    /// The bytes of `count` elements in a buffer view, from an offset on.
     fn strided(
         &self,
-        view: usize,
-        object: &Object<'_>,
+        view: Index<buffer::View>,
+        offset: u64,
         count: usize,
         element_bytes: usize,
         at: &str,
     ) -> Result<Strided<'_>, LoadError> {
-        let (bytes, stride) = self.view(view)?;
-        let offset = object.uint("byteOffset")?.unwrap_or(0);
+        let (bytes, stride) = self.view(view, at)?;
         let stride = stride.unwrap_or(element_bytes);
         if stride < element_bytes {
             let problem = format!(

@@ -1,21 +1,25 @@
 //! Animations: channels with their key frames, checked and copied out of the accessors.
 
 use glam::Quat;
+use gltf::json::accessor::{ComponentType, Type};
+use gltf::json::animation::{
+    Animation as Source, Channel as SourceChannel, Interpolation as Curve, Property,
+};
+use gltf::json::validation::Checked;
 
-use super::accessor::{Allowed, Component, Elements};
-use super::document::Document;
-use super::json::Object;
+use super::accessor::{Allowed, Elements};
+use super::document::{Document, label, name_of};
 use crate::load::LoadError;
 use crate::load::context::is_usable;
 use crate::load::finish::Draft;
 use crate::{Animation, Channel, ChannelTarget, Interpolation, LocalTransform};
 
-use Component::{F32, I8, I16, U8, U16};
+use ComponentType::{F32, I8, I16, U8, U16};
 
-const TIMES: Allowed = Allowed::new(&["SCALAR"], &[F32]);
-const VECTORS: Allowed = Allowed::new(&["VEC3"], &[F32]);
-const ROTATIONS: Allowed = Allowed::new(&["VEC4"], &[F32, I8, U8, I16, U16]);
-const WEIGHTS: Allowed = Allowed::new(&["SCALAR"], &[F32, I8, U8, I16, U16]);
+const TIMES: Allowed = Allowed::new(&[Type::Scalar], &[F32]);
+const VECTORS: Allowed = Allowed::new(&[Type::Vec3], &[F32]);
+const ROTATIONS: Allowed = Allowed::new(&[Type::Vec4], &[F32, I8, U8, I16, U16]);
+const WEIGHTS: Allowed = Allowed::new(&[Type::Scalar], &[F32, I8, U8, I16, U16]);
 
 /// Reads all animations into `draft`; the first one that moves anything plays.
 pub(super) fn read(document: &Document<'_>, draft: &mut Draft) -> Result<(), LoadError> {
@@ -24,15 +28,18 @@ pub(super) fn read(document: &Document<'_>, draft: &mut Draft) -> Result<(), Loa
     for placement in &draft.placements {
         targets[placement.node as usize] = draft.scene.meshes[placement.mesh as usize].morph_targets.len();
     }
-    for (i, object) in document.animations.iter().enumerate() {
-        let mut animation = Animation { name: object.name("animation", i)?, channels: Vec::new() };
-        let samplers = object.objects("samplers")?;
-        for channel in object.objects("channels")? {
-            let Some(channel) = read_channel(document, &channel, &samplers, &targets)? else { continue };
+    for (i, source) in document.root.animations.iter().enumerate() {
+        let at = label("animation", i, &source.name);
+        let mut animation = Animation { name: name_of("animation", i, &source.name), channels: Vec::new() };
+        for (c, channel) in source.channels.iter().enumerate() {
+            let channel_at = format!("{at}.channels[{c}]");
+            let Some(channel) = read_channel(document, &at, &channel_at, source, channel, &targets)? else {
+                continue;
+            };
             let same = |c: &Channel| c.node == channel.node && c.target == channel.target;
             if let Some(old) = animation.channels.iter_mut().find(|c| same(c)) {
                 let label = &draft.labels[channel.node as usize];
-                let (at, target) = (&object.at, channel.target);
+                let target = channel.target;
                 document
                     .context
                     .warn(format!("{at} animates {target:?} of {label} twice; the last one counts"));
@@ -44,9 +51,7 @@ pub(super) fn read(document: &Document<'_>, draft: &mut Draft) -> Result<(), Loa
                 (node.local, channel.target != ChannelTarget::MorphWeights)
             {
                 let label = &draft.labels[channel.node as usize];
-                document
-                    .context
-                    .warn(format!("{} animates {label}, which has a matrix; decomposed", object.at));
+                document.context.warn(format!("{at} animates {label}, which has a matrix; decomposed"));
                 node.local = decompose(&matrix);
             }
             animation.channels.push(channel);
@@ -68,23 +73,31 @@ fn decompose(matrix: &glam::Mat4) -> LocalTransform {
 
 fn read_channel(
     document: &Document<'_>,
-    object: &Object<'_>,
-    samplers: &[Object<'_>],
+    at: &str,
+    channel_at: &str,
+    animation: &Source,
+    channel: &SourceChannel,
     targets: &[usize],
 ) -> Result<Option<Channel>, LoadError> {
     let context = document.context;
-    let sampler =
-        object.index("sampler", "sampler", samplers.len())?.ok_or_else(|| object.missing("sampler"))?;
-    let sampler = &samplers[sampler];
-    let target = object.object("target")?.ok_or_else(|| object.missing("target"))?;
-    let node = target.index("node", "node", document.nodes.len())?;
-    let path = target.string("path")?.ok_or_else(|| target.missing("path"))?;
-    let (Some(node), Some(property)) = (node, property_of(path)) else {
-        context.warn(format!(
-            "{} animates something else than a node's transform or weights; left out",
-            object.at
-        ));
-        return Ok(None);
+    let (s, samplers) = (channel.sampler.value(), &animation.samplers);
+    let Some(sampler) = samplers.get(s) else {
+        let at = format!("{channel_at}.sampler");
+        return Err(context.out_of_range(at, "sampler", s as u64, samplers.len()));
+    };
+    let sampler_at = format!("{at}.samplers[{s}]");
+    let node = document.resolve(channel.target.node, "node", || format!("{channel_at}.target.node"))?;
+    let property = match channel.target.path {
+        Checked::Valid(Property::Translation) => ChannelTarget::Translation,
+        Checked::Valid(Property::Rotation) => ChannelTarget::Rotation,
+        Checked::Valid(Property::Scale) => ChannelTarget::Scale,
+        Checked::Valid(Property::MorphTargetWeights) => ChannelTarget::MorphWeights,
+        Checked::Invalid => {
+            context.warn(format!(
+                "{channel_at} animates something else than a node's transform or weights; left out"
+            ));
+            return Ok(None);
+        }
     };
     let (width, allowed) = match property {
         ChannelTarget::Translation | ChannelTarget::Scale => (3, VECTORS),
@@ -92,29 +105,24 @@ fn read_channel(
         ChannelTarget::MorphWeights => (targets[node], WEIGHTS),
     };
     if width == 0 {
-        context
-            .warn(format!("{} animates morph weights of node {node}, which has none; left out", object.at));
+        context.warn(format!("{channel_at} animates morph weights of node {node}, which has none; left out"));
         return Ok(None);
     }
-    let interpolation = match sampler.string("interpolation")? {
-        None | Some("LINEAR") => Interpolation::Linear,
-        Some("STEP") => Interpolation::Step,
-        Some("CUBICSPLINE") => Interpolation::CubicSpline,
-        Some(_) => {
-            context.warn(format!("{}: unknown interpolation, taken as LINEAR", sampler.at));
+    let interpolation = match sampler.interpolation {
+        Checked::Valid(Curve::Linear) => Interpolation::Linear,
+        Checked::Valid(Curve::Step) => Interpolation::Step,
+        Checked::Valid(Curve::CubicSpline) => Interpolation::CubicSpline,
+        Checked::Invalid => {
+            context.warn(format!("{sampler_at}: unknown interpolation, taken as LINEAR"));
             Interpolation::Linear
         }
     };
-    let accessor = |key: &'static str, allowed: Allowed| {
-        let index = sampler.index(key, "accessor", document.accessors.len())?;
-        document.elements(index.ok_or_else(|| sampler.missing(key))?, sampler.at_key(key), allowed)
-    };
-    let input = accessor("input", TIMES)?;
-    let output = accessor("output", allowed)?;
+    let input = document.elements(sampler.input, format!("{sampler_at}.input"), TIMES)?;
+    let output = document.elements(sampler.output, format!("{sampler_at}.output"), allowed)?;
     let values_per_key = if interpolation == Interpolation::CubicSpline { 3 * width } else { width };
     let keys = input.count;
     if keys == 0 {
-        context.warn(format!("{} has no key frames; left out", sampler.at));
+        context.warn(format!("{sampler_at} has no key frames; left out"));
         return Ok(None);
     }
     let has = output.count as u64 * output.width as u64;
@@ -124,21 +132,11 @@ fn read_channel(
             format!("holds {has} numbers, but {keys} key frames need {needs}; export the file again");
         return Err(context.invalid(output.at.as_str(), problem));
     }
-    context.charge(&sampler.at, keys as u64, 4 * (1 + values_per_key as u64))?;
+    context.charge(&sampler_at, keys as u64, 4 * (1 + values_per_key as u64))?;
     let mut channel =
         Channel { node: node as u32, target: property, interpolation, times: Vec::new(), values: Vec::new() };
     copy_keys(document, &input, &output, values_per_key, &mut channel)?;
     Ok(Some(channel))
-}
-
-fn property_of(path: &str) -> Option<ChannelTarget> {
-    Some(match path {
-        "translation" => ChannelTarget::Translation,
-        "rotation" => ChannelTarget::Rotation,
-        "scale" => ChannelTarget::Scale,
-        "weights" => ChannelTarget::MorphWeights,
-        _ => return None,
-    })
 }
 
 /// Copies the key frames whose times increase, and makes rotations unit quaternions.

@@ -4,27 +4,16 @@ use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::rc::Rc;
 
+use gltf::json::{Index, Root, buffer};
+
 use super::accessor::ANY;
-use super::json::Object;
-use crate::load::context::Context;
+use crate::load::context::{Context, is_usable};
 use crate::load::{LoadError, uri};
 
-/// Everything a glTF file lists, not yet interpreted.
+/// A glTF file and its buffers, not yet interpreted.
 pub(super) struct Document<'a> {
     pub(super) context: &'a Context<'a>,
-    pub(super) root: Object<'a>,
-    pub(super) accessors: Vec<Object<'a>>,
-    pub(super) views: Vec<Object<'a>>,
-    pub(super) nodes: Vec<Object<'a>>,
-    pub(super) meshes: Vec<Object<'a>>,
-    pub(super) skins: Vec<Object<'a>>,
-    pub(super) materials: Vec<Object<'a>>,
-    pub(super) textures: Vec<Object<'a>>,
-    pub(super) images: Vec<Object<'a>>,
-    pub(super) samplers: Vec<Object<'a>>,
-    pub(super) cameras: Vec<Object<'a>>,
-    pub(super) animations: Vec<Object<'a>>,
-    pub(super) scenes: Vec<Object<'a>>,
+    pub(super) root: &'a Root,
     buffers: Vec<Buffer<'a>>,
 }
 
@@ -50,57 +39,104 @@ impl Bytes<'_> {
     }
 }
 
+/// What to call an object in messages: `mesh 3 "column"`.
+pub(super) fn label(kind: &str, index: usize, name: &Option<String>) -> String {
+    match name {
+        Some(name) => format!("{kind} {index} \"{}\"", name.chars().take(60).collect::<String>()),
+        None => format!("{kind} {index}"),
+    }
+}
+
+/// An object's own name, or a made-up one.
+pub(super) fn name_of(kind: &str, index: usize, name: &Option<String>) -> String {
+    name.clone().filter(|name| !name.is_empty()).unwrap_or_else(|| format!("{kind} {index}"))
+}
+
 impl<'a> Document<'a> {
     pub(super) fn new(
         context: &'a Context<'a>,
-        root: Object<'a>,
+        root: &'a Root,
         glb_bin: Option<&'a [u8]>,
     ) -> Result<Self, LoadError> {
-        let buffers = read_buffers(context, &root.entities("buffers", "buffer")?, glb_bin)?;
-        Ok(Document {
-            context,
-            accessors: root.entities("accessors", "accessor")?,
-            views: root.entities("bufferViews", "buffer view")?,
-            nodes: root.entities("nodes", "node")?,
-            meshes: root.entities("meshes", "mesh")?,
-            skins: root.entities("skins", "skin")?,
-            materials: root.entities("materials", "material")?,
-            textures: root.entities("textures", "texture")?,
-            images: root.entities("images", "image")?,
-            samplers: root.entities("samplers", "sampler")?,
-            cameras: root.entities("cameras", "camera")?,
-            animations: root.entities("animations", "animation")?,
-            scenes: root.entities("scenes", "scene")?,
-            buffers,
-            root,
-        })
+        Ok(Document { context, root, buffers: read_buffers(context, root, glb_bin)? })
+    }
+
+    /// The place of a referenced object in its list.
+    pub(super) fn resolve<T>(
+        &self,
+        index: Index<T>,
+        what: &'static str,
+        at: impl FnOnce() -> String,
+    ) -> Result<usize, LoadError>
+    where
+        Root: AsRef<[T]>,
+    {
+        let (index, count) = (index.value(), AsRef::<[T]>::as_ref(self.root).len());
+        if index < count {
+            Ok(index)
+        } else {
+            Err(self.context.out_of_range(at(), what, index as u64, count))
+        }
+    }
+
+    /// Resolves a reference that may be absent.
+    pub(super) fn resolve_optional<T>(
+        &self,
+        index: Option<Index<T>>,
+        what: &'static str,
+        at: impl FnOnce() -> String,
+    ) -> Result<Option<usize>, LoadError>
+    where
+        Root: AsRef<[T]>,
+    {
+        index.map(|index| self.resolve(index, what, at)).transpose()
+    }
+
+    /// Numbers that can be computed with.
+    pub(super) fn numbers<const N: usize>(
+        &self,
+        at: &str,
+        key: &str,
+        numbers: [f32; N],
+    ) -> Result<[f32; N], LoadError> {
+        self.check_numbers(at, key, &numbers).map(|()| numbers)
+    }
+
+    pub(super) fn number(&self, at: &str, key: &str, number: f32) -> Result<f32, LoadError> {
+        self.check_numbers(at, key, &[number]).map(|()| number)
+    }
+
+    pub(super) fn check_numbers(&self, at: &str, key: &str, numbers: &[f32]) -> Result<(), LoadError> {
+        let usable = numbers.iter().copied().all(is_usable);
+        if usable { Ok(()) } else { Err(self.context.not_finite(format!("{at}.{key}"))) }
     }
 
     /// The bytes of a buffer view and its stride, if it has one.
-    pub(super) fn view(&self, index: usize) -> Result<(&[u8], Option<usize>), LoadError> {
-        let view = &self.views[index];
-        let buffer_index =
-            view.index("buffer", "buffer", self.buffers.len())?.ok_or_else(|| view.missing("buffer"))?;
-        let length = view.uint("byteLength")?.ok_or_else(|| view.missing("byteLength"))?;
-        let offset = view.uint("byteOffset")?.unwrap_or(0);
-        let stride = view.uint("byteStride")?;
+    pub(super) fn view(
+        &self,
+        index: Index<buffer::View>,
+        at: &str,
+    ) -> Result<(&[u8], Option<usize>), LoadError> {
+        let index = self.resolve(index, "buffer view", || format!("{at}.bufferView"))?;
+        let view = &self.root.buffer_views[index];
+        let at = label("buffer view", index, &view.name);
+        let buffer_index = self.resolve(view.buffer, "buffer", || format!("{at}.buffer"))?;
         let buffer = &self.buffers[buffer_index];
         if buffer.failed.get() {
-            return Err(match buffer.failure.take() {
-                Some(failure) => failure,
-                None => view.invalid(format!("needs buffer {buffer_index}, which could not be read")),
-            });
+            return Err(buffer.failure.take().unwrap_or_else(|| {
+                self.context.invalid(at, format!("needs buffer {buffer_index}, which could not be read"))
+            }));
         }
         let bytes = buffer.bytes.as_slice();
         let bytes = &bytes[..bytes.len().min(usize::try_from(buffer.length).unwrap_or(usize::MAX))];
-        let end = offset.saturating_add(length);
+        let offset = view.byte_offset.map_or(0, |offset| offset.0);
+        let end = offset.saturating_add(view.byte_length.0);
         if end > bytes.len() as u64 {
-            let at = format!("{} (in buffer {buffer_index})", view.at);
+            let at = format!("{at} (in buffer {buffer_index})");
             return Err(self.context.truncated(at, end, bytes.len() as u64));
         }
         // A stride over 252 is against the specification but harmless: reads are checked against the view.
-        let stride = stride.map(|s| usize::try_from(s).unwrap_or(usize::MAX));
-        Ok((&bytes[offset as usize..end as usize], stride))
+        Ok((&bytes[offset as usize..end as usize], view.byte_stride.map(|stride| stride.0)))
     }
 
     /// Lists what never mattered for the scene but is wrong all the same.
@@ -110,8 +146,8 @@ impl<'a> Document<'a> {
                 self.context.warn(format!("not needed by the scene, but wrong: {failure}"));
             }
         }
-        for i in 0..self.accessors.len() {
-            if let Err(flaw) = self.elements(i, "unused".to_owned(), ANY) {
+        for i in 0..self.root.accessors.len() as u32 {
+            if let Err(flaw) = self.elements(Index::new(i), "unused".to_owned(), ANY) {
                 self.context.warn(format!("not needed by the scene, but wrong: {flaw}"));
             }
         }
@@ -120,24 +156,25 @@ impl<'a> Document<'a> {
 
 fn read_buffers<'a>(
     context: &Context<'_>,
-    objects: &[Object<'_>],
+    root: &Root,
     glb_bin: Option<&'a [u8]>,
 ) -> Result<Vec<Buffer<'a>>, LoadError> {
     let mut by_path: HashMap<String, Rc<Vec<u8>>> = HashMap::new();
     let mut buffers = Vec::new();
-    for (i, object) in objects.iter().enumerate() {
-        let length = object.uint("byteLength")?.ok_or_else(|| object.missing("byteLength"))?;
-        let bytes = match (object.string("uri")?, glb_bin) {
-            (Some(reference), _) => read_buffer(context, &object.at, reference, &mut by_path),
+    for (i, buffer) in root.buffers.iter().enumerate() {
+        let at = label("buffer", i, &buffer.name);
+        let length = buffer.byte_length.0;
+        let bytes = match (&buffer.uri, glb_bin) {
+            (Some(reference), _) => read_buffer(context, &at, reference, &mut by_path),
             (None, Some(bin)) if i == 0 => Ok(Bytes::Borrowed(bin)),
             (None, _) => {
                 let problem = "has no uri, and there is no binary chunk for it; export the file again";
-                Err(object.invalid(problem))
+                Err(context.invalid(at.as_str(), problem))
             }
         };
         let checked = bytes.and_then(|bytes| {
             let has = bytes.as_slice().len() as u64;
-            if has < length { Err(context.truncated(object.at.as_str(), length, has)) } else { Ok(bytes) }
+            if has < length { Err(context.truncated(at.as_str(), length, has)) } else { Ok(bytes) }
         });
         let (bytes, failure) = match checked {
             Ok(bytes) => (bytes, None),

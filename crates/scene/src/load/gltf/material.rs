@@ -3,18 +3,26 @@
 use std::collections::HashMap;
 
 use glam::{Affine2, Vec2, Vec3, Vec4};
+use gltf::json::extensions::texture::TextureTransform;
+use gltf::json::material::{AlphaMode as Alpha, Material as Source};
+use gltf::json::texture::{Info, MagFilter, Texture as SourceTexture, WrappingMode};
+use gltf::json::validation::Checked;
+use gltf::json::{Image as SourceImage, Index};
+use serde_json::{Map, Value};
 
-use super::document::Document;
-use super::json::Object;
+use super::document::{Document, label, name_of};
 use crate::load::{LoadError, image, uri};
 use crate::{AlphaMode, Filter, Material, NormalTexture, Scene, Texture, TextureRef, Wrap};
+
+/// What the library gives as the image of textures that have none (it may be in an extension).
+const NO_SOURCE: usize = u32::MAX as usize;
 
 /// Reads images, textures and materials into `scene`. Textures that cannot be had are warned of and left out.
 pub(super) fn read(document: &Document<'_>, scene: &mut Scene) -> Result<(), LoadError> {
     let images = read_images(document, scene)?;
     let textures = read_textures(document, &images, scene)?;
-    for (i, object) in document.materials.iter().enumerate() {
-        let material = read_material(document, object, i, &textures)?;
+    for (i, source) in document.root.materials.iter().enumerate() {
+        let material = read_material(document, source, i, &textures)?;
         scene.materials.push(material);
     }
     Ok(())
@@ -25,9 +33,11 @@ fn read_images(document: &Document<'_>, scene: &mut Scene) -> Result<Vec<Option<
     // The same bytes may be listed many times: they are decoded once.
     let mut known: HashMap<String, Option<u32>> = HashMap::new();
     let mut indices = Vec::new();
-    for (i, object) in document.images.iter().enumerate() {
-        let reference = object.string("uri")?;
-        let view = object.index("bufferView", "buffer view", document.views.len())?;
+    for (i, source) in document.root.images.iter().enumerate() {
+        let at = label("image", i, &source.name);
+        let view =
+            document.resolve_optional(source.buffer_view, "buffer view", || format!("{at}.bufferView"))?;
+        let reference = source.uri.as_deref();
         let key = match (reference, view) {
             (Some(reference), _) => format!("uri {reference}"),
             (None, Some(view)) => format!("view {view}"),
@@ -36,7 +46,7 @@ fn read_images(document: &Document<'_>, scene: &mut Scene) -> Result<Vec<Option<
         let index = match known.get(&key) {
             Some(index) => *index,
             None => {
-                let index = read_image(document, object, i, reference, view, scene)?;
+                let index = read_image(document, source, i, at, scene);
                 known.insert(key, index);
                 index
             }
@@ -48,23 +58,22 @@ fn read_images(document: &Document<'_>, scene: &mut Scene) -> Result<Vec<Option<
 
 fn read_image(
     document: &Document<'_>,
-    object: &Object<'_>,
+    source: &SourceImage,
     index: usize,
-    reference: Option<&str>,
-    view: Option<usize>,
+    at: String,
     scene: &mut Scene,
-) -> Result<Option<u32>, LoadError> {
+) -> Option<u32> {
     let context = document.context;
-    let name = match reference {
-        Some(reference) if !reference.starts_with("data:") => reference.to_owned(),
-        _ => object.name("image", index)?,
+    let name = match &source.uri {
+        Some(reference) if !reference.starts_with("data:") => reference.clone(),
+        _ => name_of("image", index, &source.name),
     };
-    let decoded = match (reference, view) {
-        (Some(reference), _) => match uri::read(context, &object.at, reference) {
+    let decoded = match (&source.uri, source.buffer_view) {
+        (Some(reference), _) => match uri::read(context, &at, reference) {
             Ok(bytes) => image::decode(context, name, &bytes),
             Err(error) => Err(error.to_string()),
         },
-        (None, Some(view)) => match document.view(view) {
+        (None, Some(view)) => match document.view(view, &at) {
             Ok((bytes, _)) => image::decode(context, name, bytes),
             Err(error) => Err(error.to_string()),
         },
@@ -73,11 +82,11 @@ fn read_image(
     match decoded {
         Ok(image) => {
             scene.images.push(image);
-            Ok(Some(scene.images.len() as u32 - 1))
+            Some(scene.images.len() as u32 - 1)
         }
         Err(reason) => {
-            context.warn(format!("{} cannot be used ({reason}); materials do without it", object.at));
-            Ok(None)
+            context.warn(format!("{at} cannot be used ({reason}); materials do without it"));
+            None
         }
     }
 }
@@ -89,28 +98,23 @@ fn read_textures(
     scene: &mut Scene,
 ) -> Result<Vec<Option<u32>>, LoadError> {
     let mut indices = Vec::new();
-    for object in &document.textures {
-        let sampler = object.index("sampler", "sampler", document.samplers.len())?;
-        let source = object.index("source", "image", images.len())?;
-        if source.is_none() {
-            document.context.warn(format!("{} has no PNG or JPEG image; materials do without it", object.at));
-        }
-        let Some(image) = source.and_then(|source| images[source]) else {
+    for (i, source) in document.root.textures.iter().enumerate() {
+        let at = label("texture", i, &source.name);
+        let sampler = document.resolve_optional(source.sampler, "sampler", || format!("{at}.sampler"))?;
+        let image = if source.source.value() == NO_SOURCE {
+            document.context.warn(format!("{at} has no PNG or JPEG image; materials do without it"));
+            None
+        } else {
+            images[document.resolve(source.source, "image", || format!("{at}.source"))?]
+        };
+        let Some(image) = image else {
             indices.push(None);
             continue;
         };
         let (mut wrap_u, mut wrap_v, mut filter) = (Wrap::Repeat, Wrap::Repeat, Filter::Linear);
-        if let Some(sampler) = sampler {
-            let sampler = &document.samplers[sampler];
-            let wrap = |key: &str| {
-                Ok(match sampler.uint(key)? {
-                    Some(33071) => Wrap::Clamp,
-                    Some(33648) => Wrap::Mirror,
-                    _ => Wrap::Repeat,
-                })
-            };
-            (wrap_u, wrap_v) = (wrap("wrapS")?, wrap("wrapT")?);
-            if sampler.uint("magFilter")? == Some(9728) {
+        if let Some(sampler) = sampler.map(|sampler| &document.root.samplers[sampler]) {
+            (wrap_u, wrap_v) = (wrap_of(sampler.wrap_s), wrap_of(sampler.wrap_t));
+            if let Some(Checked::Valid(MagFilter::Nearest)) = sampler.mag_filter {
                 filter = Filter::Nearest;
             }
         }
@@ -120,79 +124,132 @@ fn read_textures(
     Ok(indices)
 }
 
+fn wrap_of(mode: Checked<WrappingMode>) -> Wrap {
+    match mode {
+        Checked::Valid(WrappingMode::ClampToEdge) => Wrap::Clamp,
+        Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::Mirror,
+        Checked::Valid(WrappingMode::Repeat) | Checked::Invalid => Wrap::Repeat,
+    }
+}
+
 fn read_material(
     document: &Document<'_>,
-    object: &Object<'_>,
+    source: &Source,
     index: usize,
     textures: &[Option<u32>],
 ) -> Result<Material, LoadError> {
-    let context = document.context;
-    let mut material = Material { name: object.name("material", index)?, ..Material::default() };
-    let texture = |object: &Object<'_>, key: &str| match object.object(key)? {
-        Some(info) => texture_ref(document, &info, textures),
-        None => Ok::<_, LoadError>(None),
-    };
+    let at = label("material", index, &source.name);
+    let reader = Reader { document, at: &at, textures };
     // Factors are fractions; what lies outside is clamped.
-    let fraction = |object: &Object<'_>, key: &str, default: f32| {
-        Ok::<f32, LoadError>(object.number(key)?.unwrap_or(default).clamp(0.0, 1.0))
-    };
-    if let Some(pbr) = object.object("pbrMetallicRoughness")? {
-        let color = pbr.numbers::<4>("baseColorFactor")?.unwrap_or([1.0; 4]);
-        material.base_color_factor = Vec4::from(color).clamp(Vec4::ZERO, Vec4::ONE);
-        material.base_color_texture = texture(&pbr, "baseColorTexture")?;
-        material.metallic_factor = fraction(&pbr, "metallicFactor", 1.0)?;
-        material.roughness_factor = fraction(&pbr, "roughnessFactor", 1.0)?;
-        material.metallic_roughness_texture = texture(&pbr, "metallicRoughnessTexture")?;
+    let fraction = |key, x| document.number(&at, key, x).map(|x| x.clamp(0.0, 1.0));
+    let pbr = &source.pbr_metallic_roughness;
+    let color = document.numbers(&at, "baseColorFactor", pbr.base_color_factor.0)?;
+    let mut emissive = Vec3::from(document.numbers(&at, "emissiveFactor", source.emissive_factor.0)?);
+    let extensions = source.extensions.as_ref();
+    if let Some(strength) = extensions.and_then(|e| e.emissive_strength.as_ref()) {
+        emissive *= document.number(&at, "emissiveStrength", strength.emissive_strength.0)?.max(0.0);
     }
-    if let (Some(texture), Some(info)) = (texture(object, "normalTexture")?, object.object("normalTexture")?)
-    {
-        material.normal_texture =
-            Some(NormalTexture { texture, scale: info.number("scale")?.unwrap_or(1.0) });
-    }
-    material.occlusion_texture = texture(object, "occlusionTexture")?;
-    material.emissive_texture = texture(object, "emissiveTexture")?;
-    let emissive = Vec3::from(object.numbers::<3>("emissiveFactor")?.unwrap_or([0.0; 3])).max(Vec3::ZERO);
-    let strength = match object.extension("KHR_materials_emissive_strength")? {
-        Some(extension) => extension.number("emissiveStrength")?.unwrap_or(1.0).max(0.0),
-        None => 1.0,
-    };
-    material.emissive_factor = emissive * strength;
-    material.unlit = object.extension("KHR_materials_unlit")?.is_some();
-    material.double_sided = object.bool("doubleSided")?.unwrap_or(false);
-    material.alpha_mode = match object.string("alphaMode")? {
-        None | Some("OPAQUE") => AlphaMode::Opaque,
-        Some("MASK") => AlphaMode::Mask { cutoff: object.number("alphaCutoff")?.unwrap_or(0.5).max(0.0) },
-        Some("BLEND") => AlphaMode::Blend,
-        Some(_) => {
-            context.warn(format!("{}: unknown alphaMode, taken as OPAQUE", object.at));
-            AlphaMode::Opaque
+    let normal_texture = match &source.normal_texture {
+        Some(map) => {
+            let others = map.extensions.as_ref().map(|e| &e.others);
+            let texture = reader.untyped("normalTexture", map.index, map.tex_coord, others)?;
+            let scale = document.number(&at, "normalTexture.scale", map.scale)?;
+            texture.map(|texture| NormalTexture { texture, scale })
         }
+        None => None,
     };
-    Ok(material)
+    let occlusion_texture = match &source.occlusion_texture {
+        Some(map) => {
+            let others = map.extensions.as_ref().map(|e| &e.others);
+            reader.untyped("occlusionTexture", map.index, map.tex_coord, others)?
+        }
+        None => None,
+    };
+    let cutoff = source.alpha_cutoff.unwrap_or_default().0;
+    Ok(Material {
+        name: name_of("material", index, &source.name),
+        base_color_factor: Vec4::from(color).clamp(Vec4::ZERO, Vec4::ONE),
+        base_color_texture: reader.info("pbrMetallicRoughness.baseColorTexture", &pbr.base_color_texture)?,
+        metallic_factor: fraction("metallicFactor", pbr.metallic_factor.0)?,
+        roughness_factor: fraction("roughnessFactor", pbr.roughness_factor.0)?,
+        metallic_roughness_texture: reader
+            .info("pbrMetallicRoughness.metallicRoughnessTexture", &pbr.metallic_roughness_texture)?,
+        normal_texture,
+        occlusion_texture,
+        emissive_factor: emissive.max(Vec3::ZERO),
+        emissive_texture: reader.info("emissiveTexture", &source.emissive_texture)?,
+        alpha_mode: match source.alpha_mode {
+            Checked::Valid(Alpha::Opaque) => AlphaMode::Opaque,
+            Checked::Valid(Alpha::Mask) => {
+                AlphaMode::Mask { cutoff: document.number(&at, "alphaCutoff", cutoff)?.max(0.0) }
+            }
+            Checked::Valid(Alpha::Blend) => AlphaMode::Blend,
+            Checked::Invalid => {
+                document.context.warn(format!("{at}: unknown alphaMode, taken as OPAQUE"));
+                AlphaMode::Opaque
+            }
+        },
+        double_sided: source.double_sided,
+        unlit: extensions.is_some_and(|e| e.unlit.is_some()),
+    })
 }
 
-fn texture_ref(
-    document: &Document<'_>,
-    info: &Object<'_>,
-    textures: &[Option<u32>],
-) -> Result<Option<TextureRef>, LoadError> {
-    let texture = info.index("index", "texture", textures.len())?.ok_or_else(|| info.missing("index"))?;
-    let mut uv_set = info.uint("texCoord")?.unwrap_or(0);
-    let mut image_from_uv = Affine2::IDENTITY;
-    if let Some(transform) = info.extension("KHR_texture_transform")? {
-        uv_set = transform.uint("texCoord")?.unwrap_or(uv_set);
-        let offset = Vec2::from(transform.numbers::<2>("offset")?.unwrap_or([0.0; 2]));
-        let scale = Vec2::from(transform.numbers::<2>("scale")?.unwrap_or([1.0; 2]));
-        let rotation = transform.number("rotation")?.unwrap_or(0.0);
-        // Counter-clockwise as seen on the image, whose v axis points down.
-        image_from_uv = Affine2::from_scale_angle_translation(scale, -rotation, offset);
+/// Reads the texture references of one material.
+struct Reader<'a> {
+    document: &'a Document<'a>,
+    at: &'a str,
+    textures: &'a [Option<u32>],
+}
+
+impl Reader<'_> {
+    fn info(&self, key: &str, info: &Option<Info>) -> Result<Option<TextureRef>, LoadError> {
+        let Some(info) = info else { return Ok(None) };
+        let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
+        self.texture_ref(key, info.index, info.tex_coord, transform)
     }
-    let Some(texture) = textures[texture] else { return Ok(None) };
-    if uv_set > 1 {
-        document
-            .context
-            .warn(format!("{}: only texture coordinate sets 0 and 1 are read; texture left out", info.at));
-        return Ok(None);
+
+    /// A reference whose transform the library leaves as it is.
+    fn untyped(
+        &self,
+        key: &str,
+        index: Index<SourceTexture>,
+        uv_set: u32,
+        extensions: Option<&Map<String, Value>>,
+    ) -> Result<Option<TextureRef>, LoadError> {
+        let transform = extensions.and_then(|extensions| extensions.get("KHR_texture_transform"));
+        let parse = |value: &Value| serde_json::from_value::<TextureTransform>(value.clone());
+        let transform = transform.map(parse).transpose().map_err(|error| LoadError::Schema {
+            file: self.document.context.file(),
+            at: format!("{}.{key}.extensions.KHR_texture_transform", self.at),
+            problem: error.to_string(),
+        })?;
+        self.texture_ref(key, index, uv_set, transform.as_ref())
     }
-    Ok(Some(TextureRef { texture, uv_set: uv_set as u8, image_from_uv }))
+
+    fn texture_ref(
+        &self,
+        key: &str,
+        index: Index<SourceTexture>,
+        mut uv_set: u32,
+        transform: Option<&TextureTransform>,
+    ) -> Result<Option<TextureRef>, LoadError> {
+        let (document, at) = (self.document, format!("{}.{key}", self.at));
+        let texture = document.resolve(index, "texture", || format!("{at}.index"))?;
+        let mut image_from_uv = Affine2::IDENTITY;
+        if let Some(transform) = transform {
+            uv_set = transform.tex_coord.unwrap_or(uv_set);
+            let offset = Vec2::from(document.numbers(&at, "offset", transform.offset.0)?);
+            let scale = Vec2::from(document.numbers(&at, "scale", transform.scale.0)?);
+            let rotation = document.number(&at, "rotation", transform.rotation.0)?;
+            // Counter-clockwise as seen on the image, whose v axis points down.
+            image_from_uv = Affine2::from_scale_angle_translation(scale, -rotation, offset);
+        }
+        let Some(texture) = self.textures[texture] else { return Ok(None) };
+        if uv_set > 1 {
+            let why = "only texture coordinate sets 0 and 1 are read; texture left out";
+            document.context.warn(format!("{at}: {why}"));
+            return Ok(None);
+        }
+        Ok(Some(TextureRef { texture, uv_set: uv_set as u8, image_from_uv }))
+    }
 }

@@ -1,30 +1,32 @@
 //! Meshes: primitives joined, strips and fans unrolled, only the vertices in use kept.
 
 use glam::{Vec2, Vec3, Vec4};
+use gltf::json::accessor::{Accessor, ComponentType, Type};
+use gltf::json::mesh::{Mesh as Source, Mode, Primitive, Semantic};
+use gltf::json::{Index, validation::Checked};
 
-use super::accessor::{Allowed, Component, Elements};
-use super::document::Document;
-use super::json::Object;
+use super::accessor::{Allowed, Elements};
+use super::document::{Document, label, name_of};
 use crate::load::context::is_usable;
 use crate::load::{LoadError, accumulate, normals};
 use crate::{Material, Mesh, MorphTarget, Scene, SkinInfluences};
 
-use Component::{F32, I8, I16, U8, U16, U32};
+use ComponentType::{F32, I8, I16, U8, U16, U32};
 
-const POSITION: Allowed = Allowed::new(&["VEC3"], &[F32, I8, U8, I16, U16]);
-const NORMAL: Allowed = Allowed::new(&["VEC3"], &[F32, I8, I16]);
-const TANGENT: Allowed = Allowed::new(&["VEC4"], &[F32, I8, I16]);
-const TEXCOORD: Allowed = Allowed::new(&["VEC2"], &[F32, I8, U8, I16, U16]);
-const COLOR: Allowed = Allowed::new(&["VEC3", "VEC4"], &[F32, U8, U16]);
-const JOINTS: Allowed = Allowed::new(&["VEC4"], &[U8, U16]);
-const WEIGHTS: Allowed = Allowed::new(&["VEC4"], &[F32, U8, U16]);
-const INDICES: Allowed = Allowed::new(&["SCALAR"], &[U8, U16, U32]);
+const POSITION: Allowed = Allowed::new(&[Type::Vec3], &[F32, I8, U8, I16, U16]);
+const NORMAL: Allowed = Allowed::new(&[Type::Vec3], &[F32, I8, I16]);
+const TANGENT: Allowed = Allowed::new(&[Type::Vec4], &[F32, I8, I16]);
+const TEXCOORD: Allowed = Allowed::new(&[Type::Vec2], &[F32, I8, U8, I16, U16]);
+const COLOR: Allowed = Allowed::new(&[Type::Vec3, Type::Vec4], &[F32, U8, U16]);
+const JOINTS: Allowed = Allowed::new(&[Type::Vec4], &[U8, U16]);
+const WEIGHTS: Allowed = Allowed::new(&[Type::Vec4], &[F32, U8, U16]);
+const INDICES: Allowed = Allowed::new(&[Type::Scalar], &[U8, U16, U32]);
 
 /// Reads all meshes into `scene`, and adds a default material if one is needed.
 pub(super) fn read(document: &Document<'_>, scene: &mut Scene) -> Result<(), LoadError> {
     let default_material = scene.materials.len() as u32;
-    for (i, object) in document.meshes.iter().enumerate() {
-        let mesh = read_mesh(document, object, i, default_material)?;
+    for (i, source) in document.root.meshes.iter().enumerate() {
+        let mesh = read_mesh(document, source, i, default_material)?;
         scene.meshes.push(mesh);
     }
     let uses_default = |mesh: &Mesh| mesh.parts.iter().any(|part| part.material == default_material);
@@ -36,40 +38,38 @@ pub(super) fn read(document: &Document<'_>, scene: &mut Scene) -> Result<(), Loa
 
 fn read_mesh(
     document: &Document<'_>,
-    object: &Object<'_>,
+    source: &Source,
     index: usize,
     default_material: u32,
 ) -> Result<Mesh, LoadError> {
     let context = document.context;
-    let mut mesh = Mesh { name: object.name("mesh", index)?, ..Mesh::default() };
-    if !object.has("primitives") {
-        return Err(object.missing("primitives"));
-    }
+    let at = label("mesh", index, &source.name);
+    let mut mesh = Mesh { name: name_of("mesh", index, &source.name), ..Mesh::default() };
     let mut target_counts = Vec::new();
-    for primitive in object.objects("primitives")? {
-        let material = primitive
-            .index("material", "material", document.materials.len())?
+    for (p, primitive) in source.primitives.iter().enumerate() {
+        let at = format!("{at}.primitives[{p}]");
+        let material = document
+            .resolve_optional(primitive.material, "material", || format!("{at}.material"))?
             .map_or(default_material, |material| material as u32);
-        let Some(piece) = read_primitive(document, &primitive)? else { continue };
+        let Some(piece) = (Reader { document, primitive, at: &at }).piece()? else { continue };
         target_counts.push(piece.morph_targets.len());
-        accumulate::append(context, &primitive.at, &mut mesh, piece, material)?;
+        accumulate::append(context, &at, &mut mesh, piece, material)?;
     }
     if target_counts.windows(2).any(|pair| pair[0] != pair[1]) {
-        let at = &object.at;
         context.warn(format!(
             "{at}: its primitives have different numbers of morph targets; missing ones stay still"
         ));
     }
     let mended = accumulate::normalize_weights(&mut mesh.influences);
     if mended > 0 {
-        let at = &object.at;
         context.warn(format!(
             "{at}: joint weights of {mended} vertices were zero, negative or not finite; mended"
         ));
     }
-    let mut weights = object.number_list("weights")?;
+    let mut weights = source.weights.clone().unwrap_or_default();
+    document.check_numbers(&at, "weights", &weights)?;
     if !weights.is_empty() && weights.len() != mesh.morph_targets.len() {
-        let (at, targets) = (&object.at, mesh.morph_targets.len());
+        let targets = mesh.morph_targets.len();
         context.warn(format!(
             "{at} has {} morph weights for {targets} morph targets; made to fit",
             weights.len()
@@ -78,51 +78,6 @@ fn read_mesh(
     weights.resize(mesh.morph_targets.len(), 0.0);
     mesh.morph_weights = weights;
     Ok(mesh)
-}
-
-/// The triangles of one primitive, or `None` (with a warning) if there is nothing to draw.
-fn read_primitive(document: &Document<'_>, primitive: &Object<'_>) -> Result<Option<Mesh>, LoadError> {
-    let context = document.context;
-    let reader = Reader { document, primitive };
-    let mode = primitive.uint("mode")?.unwrap_or(4);
-    let attributes = primitive.object("attributes")?.ok_or_else(|| primitive.missing("attributes"))?;
-    match mode {
-        0..=3 => {
-            context.warn(format!("{}: points and lines are left out", primitive.at));
-            return Ok(None);
-        }
-        4..=6 => {}
-        _ => return Err(primitive.invalid(format!("mode {mode} does not exist; export the file again"))),
-    }
-    let Some(positions) = reader.attribute(&attributes, "POSITION", POSITION, None)? else {
-        context.warn(format!("{}: left out, as it has no POSITION", primitive.at));
-        return Ok(None);
-    };
-    let triangles = reader.triangles(mode, &positions)?;
-    if triangles.is_empty() {
-        context.warn(format!("{}: left out, as it has no triangles", primitive.at));
-        return Ok(None);
-    }
-    let (used, triangles) = used_vertices(positions.count, triangles);
-    let mut piece = reader.vertices(&attributes, &positions, &used)?;
-    piece.triangles = triangles;
-    if piece.normals.is_empty() {
-        // glTF: flat normals, and tangents are to be ignored.
-        let corners = 3 * piece.triangles.len() as u64;
-        context.charge(&primitive.at, corners, vertex_bytes(&piece) + 12)?;
-        piece = accumulate::unshare(piece);
-        normals::set_flat(&mut piece);
-    } else {
-        let mended = normals::mend(&mut piece);
-        if mended > 0 {
-            let at = &primitive.at;
-            context.warn(format!(
-                "{at}: {mended} normals were zero or not finite; taken from the faces instead"
-            ));
-        }
-        reader.mend_tangents(&mut piece);
-    }
-    Ok(Some(piece))
 }
 
 fn vertex_bytes(mesh: &Mesh) -> u64 {
@@ -164,23 +119,77 @@ fn used_vertices(count: usize, mut triangles: Vec<[u32; 3]>) -> (Vec<u32>, Vec<[
     }
 }
 
+/// Reads one primitive.
 struct Reader<'a> {
     document: &'a Document<'a>,
-    primitive: &'a Object<'a>,
+    primitive: &'a Primitive,
+    at: &'a str,
 }
 
 impl Reader<'_> {
+    /// The triangles of the primitive, or `None` (with a warning) if there is nothing to draw.
+    fn piece(&self) -> Result<Option<Mesh>, LoadError> {
+        let (context, at) = (self.document.context, self.at);
+        let mode = match self.primitive.mode {
+            Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
+            Checked::Valid(_) => {
+                context.warn(format!("{at}: points and lines are left out"));
+                return Ok(None);
+            }
+            Checked::Invalid => {
+                return Err(context.invalid(at, "its mode does not exist; export the file again"));
+            }
+        };
+        let Some(positions) = self.attribute(Semantic::Positions, POSITION, None)? else {
+            context.warn(format!("{at}: left out, as it has no POSITION"));
+            return Ok(None);
+        };
+        let triangles = self.triangles(mode, &positions)?;
+        if triangles.is_empty() {
+            context.warn(format!("{at}: left out, as it has no triangles"));
+            return Ok(None);
+        }
+        let (used, triangles) = used_vertices(positions.count, triangles);
+        let mut piece = self.vertices(&positions, &used)?;
+        piece.triangles = triangles;
+        if piece.normals.is_empty() {
+            // glTF: flat normals, and tangents are to be ignored.
+            let corners = 3 * piece.triangles.len() as u64;
+            context.charge(at, corners, vertex_bytes(&piece) + 12)?;
+            piece = accumulate::unshare(piece);
+            normals::set_flat(&mut piece);
+        } else {
+            let mended = normals::mend(&mut piece);
+            if mended > 0 {
+                context.warn(format!(
+                    "{at}: {mended} normals were zero or not finite; taken from the faces instead"
+                ));
+            }
+            self.mend_tangents(&mut piece);
+        }
+        Ok(Some(piece))
+    }
+
     fn attribute(
         &self,
-        attributes: &Object<'_>,
-        name: &str,
+        semantic: Semantic,
         allowed: Allowed,
         count: Option<usize>,
     ) -> Result<Option<Elements<'_>>, LoadError> {
-        let Some(index) = attributes.index(name, "accessor", self.document.accessors.len())? else {
-            return Ok(None);
-        };
-        let elements = self.document.elements(index, attributes.at_key(name), allowed)?;
+        let key = format!("attributes.{}", semantic.to_string());
+        let accessor = self.primitive.attributes.get(&Checked::Valid(semantic)).copied();
+        self.optional_elements(&key, accessor, allowed, count)
+    }
+
+    fn optional_elements(
+        &self,
+        key: &str,
+        accessor: Option<Index<Accessor>>,
+        allowed: Allowed,
+        count: Option<usize>,
+    ) -> Result<Option<Elements<'_>>, LoadError> {
+        let Some(accessor) = accessor else { return Ok(None) };
+        let elements = self.document.elements(accessor, format!("{}.{key}", self.at), allowed)?;
         if let Some(count) = count
             && elements.count != count
         {
@@ -191,17 +200,17 @@ impl Reader<'_> {
         Ok(Some(elements))
     }
 
-    fn triangles(&self, mode: u64, positions: &Elements<'_>) -> Result<Vec<[u32; 3]>, LoadError> {
+    fn triangles(&self, mode: Mode, positions: &Elements<'_>) -> Result<Vec<[u32; 3]>, LoadError> {
         let context = self.document.context;
         let vertices = positions.count;
-        let indices = self.attribute(self.primitive, "indices", INDICES, None)?;
+        let indices = self.optional_elements("indices", self.primitive.indices, INDICES, None)?;
         let count = indices.as_ref().map_or(vertices, |indices| indices.count);
-        context.charge(&self.primitive.at, count as u64, 16)?;
+        context.charge(self.at, count as u64, 16)?;
         let corners: Vec<u32> = match &indices {
             Some(indices) => (0..count).map(|i| indices.uint(i, 0)).collect(),
             None => {
                 let count = u32::try_from(count)
-                    .map_err(|_| self.primitive.invalid("has more than 2^32 vertices; split it"))?;
+                    .map_err(|_| context.invalid(self.at, "has more than 2^32 vertices; split it"))?;
                 (0..count).collect()
             }
         };
@@ -211,9 +220,16 @@ impl Reader<'_> {
         }
         let n = corners.len();
         Ok(match mode {
-            4 => {
+            Mode::TriangleStrip => (0..n.saturating_sub(2))
+                .map(|i| [corners[i], corners[i + 1 + i % 2], corners[i + 2 - i % 2]])
+                .filter(|[a, b, c]| a != b && b != c && c != a)
+                .collect(),
+            Mode::TriangleFan => {
+                (0..n.saturating_sub(2)).map(|i| [corners[i + 1], corners[i + 2], corners[0]]).collect()
+            }
+            _ => {
                 if !n.is_multiple_of(3) {
-                    let at = &self.primitive.at;
+                    let at = self.at;
                     context.warn(format!(
                         "{at}: {n} corners are not whole triangles; the last {} are left out",
                         n % 3
@@ -221,33 +237,23 @@ impl Reader<'_> {
                 }
                 corners.as_chunks::<3>().0.to_vec()
             }
-            5 => (0..n.saturating_sub(2))
-                .map(|i| [corners[i], corners[i + 1 + i % 2], corners[i + 2 - i % 2]])
-                .filter(|[a, b, c]| a != b && b != c && c != a)
-                .collect(),
-            _ => (0..n.saturating_sub(2)).map(|i| [corners[i + 1], corners[i + 2], corners[0]]).collect(),
         })
     }
 
-    fn vertices(
-        &self,
-        attributes: &Object<'_>,
-        positions: &Elements<'_>,
-        used: &[u32],
-    ) -> Result<Mesh, LoadError> {
+    fn vertices(&self, positions: &Elements<'_>, used: &[u32]) -> Result<Mesh, LoadError> {
         let context = self.document.context;
         let count = Some(positions.count);
         let mut mesh = Mesh { positions: self.vectors(positions, used)?, ..Mesh::default() };
-        if let Some(normals) = self.attribute(attributes, "NORMAL", NORMAL, count)? {
+        if let Some(normals) = self.attribute(Semantic::Normals, NORMAL, count)? {
             self.charge(used, 12)?;
             mesh.normals = used.iter().map(|&v| Vec3::from(normals.floats::<3>(v as usize))).collect();
-            if let Some(tangents) = self.attribute(attributes, "TANGENT", TANGENT, count)? {
+            if let Some(tangents) = self.attribute(Semantic::Tangents, TANGENT, count)? {
                 self.charge(used, 16)?;
                 mesh.tangents = used.iter().map(|&v| Vec4::from(tangents.floats::<4>(v as usize))).collect();
             }
         }
-        for (list, name) in mesh.uvs.iter_mut().zip(["TEXCOORD_0", "TEXCOORD_1"]) {
-            if let Some(uvs) = self.attribute(attributes, name, TEXCOORD, count)? {
+        for (list, set) in mesh.uvs.iter_mut().zip(0..) {
+            if let Some(uvs) = self.attribute(Semantic::TexCoords(set), TEXCOORD, count)? {
                 self.charge(used, 8)?;
                 *list = used.iter().map(|&v| Vec2::from(uvs.floats::<2>(v as usize))).collect();
                 let bad = list.iter_mut().filter(|uv| !uv.to_array().into_iter().all(is_usable));
@@ -257,7 +263,7 @@ impl Reader<'_> {
                 }
             }
         }
-        if let Some(colors) = self.attribute(attributes, "COLOR_0", COLOR, count)? {
+        if let Some(colors) = self.attribute(Semantic::Colors(0), COLOR, count)? {
             self.charge(used, 16)?;
             let color = |v: &u32| {
                 let [r, g, b, a] = colors.floats::<4>(*v as usize);
@@ -267,15 +273,16 @@ impl Reader<'_> {
             };
             mesh.colors = used.iter().map(color).collect();
         }
-        mesh.influences = self.influences(attributes, used, count)?;
-        for target in &self.primitive.objects("targets")? {
+        mesh.influences = self.influences(used, count)?;
+        for (i, target) in self.primitive.targets.iter().flatten().enumerate() {
             let mut morph = MorphTarget::default();
-            if let Some(offsets) = self.attribute(target, "POSITION", POSITION, count)? {
+            let key = format!("targets[{i}].POSITION");
+            if let Some(offsets) = self.optional_elements(&key, target.positions, POSITION, count)? {
                 morph.positions = self.vectors(&offsets, used)?;
             }
-            if let (false, Some(offsets)) =
-                (mesh.normals.is_empty(), self.attribute(target, "NORMAL", NORMAL, count)?)
-            {
+            let key = format!("targets[{i}].NORMAL");
+            let normals = target.normals.filter(|_| !mesh.normals.is_empty());
+            if let Some(offsets) = self.optional_elements(&key, normals, NORMAL, count)? {
                 morph.normals = self.vectors(&offsets, used)?;
             }
             mesh.morph_targets.push(morph);
@@ -297,18 +304,12 @@ impl Reader<'_> {
         used.iter().map(vector).collect()
     }
 
-    fn influences(
-        &self,
-        attributes: &Object<'_>,
-        used: &[u32],
-        count: Option<usize>,
-    ) -> Result<Vec<SkinInfluences>, LoadError> {
+    fn influences(&self, used: &[u32], count: Option<usize>) -> Result<Vec<SkinInfluences>, LoadError> {
         let mut sets = Vec::new();
         loop {
-            let (joints_name, weights_name) =
-                (format!("JOINTS_{}", sets.len()), format!("WEIGHTS_{}", sets.len()));
-            let joints = self.attribute(attributes, &joints_name, JOINTS, count)?;
-            let weights = self.attribute(attributes, &weights_name, WEIGHTS, count)?;
+            let set = sets.len() as u32;
+            let joints = self.attribute(Semantic::Joints(set), JOINTS, count)?;
+            let weights = self.attribute(Semantic::Weights(set), WEIGHTS, count)?;
             match (joints, weights) {
                 (Some(joints), Some(weights)) => {
                     self.charge(used, 24)?;
@@ -327,8 +328,8 @@ impl Reader<'_> {
                 (None, None) => return Ok(sets),
                 (Some(_), None) | (None, Some(_)) => {
                     let problem =
-                        format!("{joints_name} and {weights_name} must come together; export the file again");
-                    return Err(attributes.invalid(problem));
+                        format!("JOINTS_{set} and WEIGHTS_{set} must come together; export the file again");
+                    return Err(self.document.context.invalid(self.at, problem));
                 }
             }
         }
@@ -346,12 +347,12 @@ impl Reader<'_> {
             }
         }
         if bad > 0 {
-            let at = &self.primitive.at;
+            let at = self.at;
             self.document.context.warn(format!("{at}: {bad} tangents were zero or not finite; replaced"));
         }
     }
 
     fn charge(&self, used: &[u32], bytes_per_vertex: u64) -> Result<(), LoadError> {
-        self.document.context.charge(&self.primitive.at, used.len() as u64, bytes_per_vertex)
+        self.document.context.charge(self.at, used.len() as u64, bytes_per_vertex)
     }
 }

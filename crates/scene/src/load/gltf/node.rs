@@ -1,34 +1,38 @@
 //! Nodes, skins, cameras, lights, and which of the nodes the scene shows.
 
 use glam::{Affine3A, Mat4, Quat, Vec3};
+use gltf::json::accessor::{ComponentType, Type};
+use gltf::json::camera::{Camera as SourceCamera, Type as CameraType};
+use gltf::json::extensions::scene::khr_lights_punctual::{Light as SourceLight, Type as LightType};
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Node as SourceNode, Skin as SourceSkin};
+use serde_json::Value;
 
-use super::accessor::{Allowed, Component};
-use super::document::Document;
-use super::json::Object;
+use super::accessor::Allowed;
+use super::document::{Document, label, name_of};
 use crate::load::LoadError;
 use crate::load::context::is_usable;
 use crate::load::finish::{Draft, Placement};
 use crate::{Camera, Light, LightKind, LocalTransform, Node, Projection, Skin};
 
-const MATRICES: Allowed = Allowed::new(&["MAT4"], &[Component::F32]);
+const MATRICES: Allowed = Allowed::new(&[Type::Mat4], &[ComponentType::F32]);
 
 /// Reads everything that hangs on nodes into `draft`.
 pub(super) fn read(document: &Document<'_>, draft: &mut Draft) -> Result<(), LoadError> {
-    for (i, object) in document.cameras.iter().enumerate() {
-        let projection = read_projection(object)?;
-        draft.scene.cameras.push(Camera { name: object.name("camera", i)?, projection });
+    for (i, source) in document.root.cameras.iter().enumerate() {
+        let projection = read_projection(document, source, &label("camera", i, &source.name))?;
+        draft.scene.cameras.push(Camera { name: name_of("camera", i, &source.name), projection });
     }
-    if let Some(extension) = document.root.extension("KHR_lights_punctual")? {
-        for (i, object) in extension.entities("lights", "light")?.iter().enumerate() {
-            draft.scene.lights.push(read_light(object, i)?);
-        }
+    let lights: &[SourceLight] = document.root.as_ref();
+    for (i, source) in lights.iter().enumerate() {
+        draft.scene.lights.push(read_light(document, source, i)?);
     }
-    for (i, object) in document.skins.iter().enumerate() {
-        let skin = read_skin(document, object, i)?;
+    for (i, source) in document.root.skins.iter().enumerate() {
+        let skin = read_skin(document, source, i)?;
         draft.scene.skins.push(skin);
     }
-    for (i, object) in document.nodes.iter().enumerate() {
-        read_node(document, object, i, draft)?;
+    for (i, source) in document.root.nodes.iter().enumerate() {
+        read_node(document, source, i, draft)?;
     }
     link_parents(document, draft)?;
     let shown = shown_nodes(document, draft)?;
@@ -41,86 +45,92 @@ pub(super) fn read(document: &Document<'_>, draft: &mut Draft) -> Result<(), Loa
     Ok(())
 }
 
-fn read_projection(object: &Object<'_>) -> Result<Projection, LoadError> {
-    let context = object.context;
-    let positive = |lens: &Object<'_>, key: &'static str, default: f32| {
-        let value = lens.number(key)?.ok_or_else(|| lens.missing(key))?.abs();
+fn read_projection(
+    document: &Document<'_>,
+    source: &SourceCamera,
+    at: &str,
+) -> Result<Projection, LoadError> {
+    let context = document.context;
+    let missing = |property| LoadError::Missing { file: context.file(), at: at.to_owned(), property };
+    let positive = |key: &str, value: f32, default: f32| {
+        let value = document.number(at, key, value)?.abs();
         if value > 0.0 {
             return Ok(value);
         }
-        context.warn(format!("{} is 0; taken as {default}", lens.at_key(key)));
+        context.warn(format!("{at}.{key} is 0; taken as {default}"));
         Ok::<f32, LoadError>(default)
     };
-    match object.string("type")? {
-        Some("perspective") => {
-            let lens = object.object("perspective")?.ok_or_else(|| object.missing("perspective"))?;
-            let mut yfov = positive(&lens, "yfov", 0.8)?;
+    match source.type_ {
+        Checked::Valid(CameraType::Perspective) => {
+            let lens = source.perspective.as_ref().ok_or_else(|| missing("perspective"))?;
+            let mut yfov = positive("perspective.yfov", lens.yfov, 0.8)?;
             if yfov >= std::f32::consts::PI {
-                context.warn(format!("{} is not below π; taken as 3.1", lens.at_key("yfov")));
+                context.warn(format!("{at}.perspective.yfov is not below π; taken as 3.1"));
                 yfov = 3.1;
             }
-            Ok(Projection::Perspective { yfov, near: positive(&lens, "znear", 0.01)? })
+            Ok(Projection::Perspective { yfov, near: positive("perspective.znear", lens.znear, 0.01)? })
         }
-        Some("orthographic") => {
-            let lens = object.object("orthographic")?.ok_or_else(|| object.missing("orthographic"))?;
-            let half_height = positive(&lens, "ymag", 1.0)?;
-            let near = lens.number("znear")?.ok_or_else(|| lens.missing("znear"))?;
-            let mut far = lens.number("zfar")?.ok_or_else(|| lens.missing("zfar"))?;
+        Checked::Valid(CameraType::Orthographic) => {
+            let lens = source.orthographic.as_ref().ok_or_else(|| missing("orthographic"))?;
+            let half_height = positive("orthographic.ymag", lens.ymag, 1.0)?;
+            let [near, mut far] =
+                document.numbers(at, "orthographic.znear or zfar", [lens.znear, lens.zfar])?;
             if far <= near {
                 far = near + near.abs().max(1.0) * 1000.0;
-                context.warn(format!("{} is not beyond znear; taken as {far}", lens.at_key("zfar")));
+                context.warn(format!("{at}.orthographic.zfar is not beyond znear; taken as {far}"));
             }
             Ok(Projection::Orthographic { half_height, near, far })
         }
-        Some(_) => Err(object.invalid("type must be 'perspective' or 'orthographic'; export the file again")),
-        None => Err(object.missing("type")),
+        Checked::Invalid => {
+            Err(context.invalid(at, "type must be 'perspective' or 'orthographic'; export the file again"))
+        }
     }
 }
 
-fn read_light(object: &Object<'_>, index: usize) -> Result<Light, LoadError> {
-    let kind = match object.string("type")? {
-        Some("directional") => LightKind::Directional,
-        Some("point") => LightKind::Point,
-        Some("spot") => {
-            let (inner, outer) = match object.object("spot")? {
-                Some(spot) => (spot.number("innerConeAngle")?, spot.number("outerConeAngle")?),
-                None => (None, None),
-            };
+fn read_light(document: &Document<'_>, source: &SourceLight, index: usize) -> Result<Light, LoadError> {
+    let at = label("light", index, &source.name);
+    let kind = match source.type_ {
+        Checked::Valid(LightType::Directional) => LightKind::Directional,
+        Checked::Valid(LightType::Point) => LightKind::Point,
+        Checked::Valid(LightType::Spot) => {
             let (right, quarter) = (std::f32::consts::FRAC_PI_2, std::f32::consts::FRAC_PI_4);
-            let outer_cone_angle = outer.unwrap_or(quarter).clamp(1e-3, right);
-            let inner_cone_angle = inner.unwrap_or(0.0).clamp(0.0, outer_cone_angle - 5e-4);
+            let spot = source.spot.as_ref();
+            let angles = spot.map_or([0.0, quarter], |s| [s.inner_cone_angle, s.outer_cone_angle]);
+            let [inner, outer] = document.numbers(&at, "spot", angles)?;
+            let outer_cone_angle = outer.clamp(1e-3, right);
+            let inner_cone_angle = inner.clamp(0.0, outer_cone_angle - 5e-4);
             LightKind::Spot { inner_cone_angle, outer_cone_angle }
         }
-        Some(_) => {
-            return Err(
-                object.invalid("type must be 'directional', 'point' or 'spot'; export the file again")
-            );
+        Checked::Invalid => {
+            let problem = "type must be 'directional', 'point' or 'spot'; export the file again";
+            return Err(document.context.invalid(at, problem));
         }
-        None => return Err(object.missing("type")),
     };
-    let intensity = object.number("intensity")?.unwrap_or(1.0);
+    let intensity = document.number(&at, "intensity", source.intensity)?;
     if intensity < 0.0 {
-        object.context.warn(format!("{}: its intensity {intensity} is taken as 0", object.at));
+        document.context.warn(format!("{at}: its intensity {intensity} is taken as 0"));
     }
+    let range = source.range.map(|range| document.number(&at, "range", range)).transpose()?;
     Ok(Light {
-        name: object.name("light", index)?,
-        color: Vec3::from(object.numbers::<3>("color")?.unwrap_or([1.0; 3])).max(Vec3::ZERO),
+        name: name_of("light", index, &source.name),
+        color: Vec3::from(document.numbers(&at, "color", source.color)?).max(Vec3::ZERO),
         intensity: intensity.max(0.0),
-        range: object.number("range")?.filter(|range| *range > 0.0),
+        range: range.filter(|range| *range > 0.0),
         kind,
     })
 }
 
-fn read_skin(document: &Document<'_>, object: &Object<'_>, index: usize) -> Result<Skin, LoadError> {
+fn read_skin(document: &Document<'_>, source: &SourceSkin, index: usize) -> Result<Skin, LoadError> {
     let context = document.context;
-    let joints = object.indices("joints", "node", document.nodes.len())?;
+    let at = label("skin", index, &source.name);
+    let joints = resolve_nodes(document, &source.joints, &at, "joints")?;
     if joints.is_empty() {
-        return Err(object.missing("joints"));
+        return Err(LoadError::Missing { file: context.file(), at, property: "joints" });
     }
-    object.index("skeleton", "node", document.nodes.len())?;
+    document.resolve_optional(source.skeleton, "node", || format!("{at}.skeleton"))?;
     let mut inverse_bind_matrices = vec![Affine3A::IDENTITY; joints.len()];
-    if let Some(accessor) = object.index("inverseBindMatrices", "accessor", document.accessors.len())? {
-        let matrices = document.elements(accessor, object.at_key("inverseBindMatrices"), MATRICES)?;
+    if let Some(accessor) = source.inverse_bind_matrices {
+        let matrices = document.elements(accessor, format!("{at}.inverseBindMatrices"), MATRICES)?;
         if matrices.count < joints.len() {
             let problem = format!("holds {} matrices for {} joints", matrices.count, joints.len());
             return Err(context.invalid(matrices.at.as_str(), format!("{problem}; export the file again")));
@@ -138,7 +148,20 @@ fn read_skin(document: &Document<'_>, object: &Object<'_>, index: usize) -> Resu
             context.warn(format!("{}: the last row of a matrix is not 0 0 0 1; taken as that", matrices.at));
         }
     }
-    Ok(Skin { name: object.name("skin", index)?, joints, inverse_bind_matrices })
+    Ok(Skin { name: name_of("skin", index, &source.name), joints, inverse_bind_matrices })
+}
+
+/// Checks a list of references to nodes.
+fn resolve_nodes(
+    document: &Document<'_>,
+    nodes: &[Index<SourceNode>],
+    at: &str,
+    key: &str,
+) -> Result<Vec<u32>, LoadError> {
+    let resolve = |(i, node): (usize, &Index<SourceNode>)| {
+        document.resolve(*node, "node", || format!("{at}.{key}[{i}]")).map(|node| node as u32)
+    };
+    nodes.iter().enumerate().map(resolve).collect()
 }
 
 fn is_affine(columns: &[f32; 16]) -> bool {
@@ -147,38 +170,41 @@ fn is_affine(columns: &[f32; 16]) -> bool {
 
 fn read_node(
     document: &Document<'_>,
-    object: &Object<'_>,
+    source: &SourceNode,
     index: usize,
     draft: &mut Draft,
 ) -> Result<(), LoadError> {
     let context = document.context;
     let scene = &mut draft.scene;
-    let light = match object.extension("KHR_lights_punctual")? {
-        Some(extension) => extension.index("light", "light", scene.lights.len())?,
-        None => None,
-    };
-    let camera = object.index("camera", "camera", scene.cameras.len())?;
-    let mesh = object.index("mesh", "mesh", scene.meshes.len())?;
-    let mut skin = object.index("skin", "skin", scene.skins.len())?;
-    let mut morph_weights = object.number_list("weights")?;
+    let at = label("node", index, &source.name);
+    let light = source.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
+    let light = document.resolve_optional(light.map(|l| l.light), "light", || {
+        format!("{at}.extensions.KHR_lights_punctual")
+    })?;
+    let camera = document.resolve_optional(source.camera, "camera", || format!("{at}.camera"))?;
+    let mesh = document.resolve_optional(source.mesh, "mesh", || format!("{at}.mesh"))?;
+    let mut skin = document.resolve_optional(source.skin, "skin", || format!("{at}.skin"))?;
+    let mut morph_weights = source.weights.clone().unwrap_or_default();
+    document.check_numbers(&at, "weights", &morph_weights)?;
     let targets = mesh.map_or(0, |mesh| scene.meshes[mesh].morph_targets.len());
     if !morph_weights.is_empty() && morph_weights.len() != targets {
         let n = morph_weights.len();
-        context.warn(format!("{} has {n} morph weights for {targets} morph targets; made to fit", object.at));
+        context.warn(format!("{at} has {n} morph weights for {targets} morph targets; made to fit"));
         morph_weights.resize(targets, 0.0);
     }
     if let Some(mesh) = mesh {
         if skin.is_some() && scene.meshes[mesh].influences.is_empty() {
-            context.warn(format!("{}: its skin is ignored, as mesh {mesh} has no joint weights", object.at));
+            context.warn(format!("{at}: its skin is ignored, as mesh {mesh} has no joint weights"));
             skin = None;
         }
-        let extras = object.extras();
+        // Extras may be anything at all.
+        let extras = source.extras.as_ref().and_then(|e| serde_json::from_str::<Value>(e.get()).ok());
         let flag = |key: &str| {
-            let value = extras.and_then(|extras| extras.get(key));
+            let value = extras.as_ref().and_then(|extras| extras.get(key));
             if value.is_some_and(|value| !value.is_boolean()) {
-                context.warn(format!("{}: extras.{key} must be true or false; taken as true", object.at));
+                context.warn(format!("{at}: extras.{key} must be true or false; taken as true"));
             }
-            value.and_then(serde_json::Value::as_bool).unwrap_or(true)
+            value.and_then(Value::as_bool).unwrap_or(true)
         };
         draft.placements.push(Placement {
             node: index as u32,
@@ -188,50 +214,54 @@ fn read_node(
             receives: flag("receives"),
         });
     } else if skin.is_some() {
-        context.warn(format!("{} has a skin but no mesh; ignored", object.at));
+        context.warn(format!("{at} has a skin but no mesh; ignored"));
     }
-    draft.children.push(object.indices("children", "node", document.nodes.len())?);
-    draft.labels.push(object.at.clone());
+    draft.children.push(resolve_nodes(document, source.children.as_deref().unwrap_or(&[]), &at, "children")?);
     draft.scene.nodes.push(Node {
-        name: object.name("node", index)?,
+        name: name_of("node", index, &source.name),
         parent: None,
-        local: read_transform(object)?,
+        local: read_transform(document, source, &at)?,
         camera: camera.map(|camera| camera as u32),
         light: light.map(|light| light as u32),
         morph_weights,
     });
+    draft.labels.push(at);
     Ok(())
 }
 
-fn read_transform(object: &Object<'_>) -> Result<LocalTransform, LoadError> {
-    let context = object.context;
-    let translation = object.numbers::<3>("translation")?;
-    let rotation = object.numbers::<4>("rotation")?;
-    let scale = object.numbers::<3>("scale")?;
-    if let Some(columns) = object.numbers::<16>("matrix")? {
-        if translation.is_some() || rotation.is_some() || scale.is_some() {
+fn read_transform(
+    document: &Document<'_>,
+    source: &SourceNode,
+    at: &str,
+) -> Result<LocalTransform, LoadError> {
+    let context = document.context;
+    let translation = document.numbers(at, "translation", source.translation.unwrap_or([0.0; 3]))?;
+    let rotation = document.numbers(at, "rotation", source.rotation.unwrap_or_default().0)?;
+    let scale = document.numbers(at, "scale", source.scale.unwrap_or([1.0; 3]))?;
+    if let Some(columns) = source.matrix {
+        document.check_numbers(at, "matrix", &columns)?;
+        if source.translation.is_some() || source.rotation.is_some() || source.scale.is_some() {
             context.warn(format!(
-                "{} has both a matrix and translation, rotation or scale; the matrix is used",
-                object.at
+                "{at} has both a matrix and translation, rotation or scale; the matrix is used"
             ));
         }
         let mut matrix = Mat4::from_cols_array(&columns);
         if !is_affine(&columns) {
-            context.warn(format!("{}: the last row of its matrix is not 0 0 0 1; taken as that", object.at));
+            context.warn(format!("{at}: the last row of its matrix is not 0 0 0 1; taken as that"));
             matrix = Mat4::from(Affine3A::from_mat4(matrix));
         }
         return Ok(LocalTransform::Matrix(matrix));
     }
-    let rotation = Quat::from_array(rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
+    let rotation = Quat::from_array(rotation);
     let length = rotation.length();
     if (length - 1.0).abs() > 1e-3 {
-        context.warn(format!("{}: its rotation is not a unit quaternion; normalized", object.at));
+        context.warn(format!("{at}: its rotation is not a unit quaternion; normalized"));
     }
     let unit = rotation.normalize();
     Ok(LocalTransform::Trs {
-        translation: translation.map_or(Vec3::ZERO, Vec3::from),
+        translation: Vec3::from(translation),
         rotation: if length > 0.0 && unit.is_finite() { unit } else { Quat::IDENTITY },
-        scale: scale.map_or(Vec3::ONE, Vec3::from),
+        scale: Vec3::from(scale),
     })
 }
 
@@ -262,28 +292,22 @@ fn link_parents(document: &Document<'_>, draft: &mut Draft) -> Result<(), LoadEr
 /// Whether each node is below a root of the default scene (or the first; without any scene all nodes are shown).
 fn shown_nodes(document: &Document<'_>, draft: &Draft) -> Result<Vec<bool>, LoadError> {
     let count = draft.scene.nodes.len();
-    let default = document.root.index("scene", "scene", document.scenes.len());
-    // Without any scenes, a default scene is a slip that hides nothing.
-    let default = if document.scenes.is_empty() && default.is_err() {
-        if matches!(default, Err(LoadError::WrongType { .. })) {
-            return default.map(|_| Vec::new());
+    let scenes = &document.root.scenes;
+    if scenes.is_empty() {
+        // Without any scenes, a default scene is a slip that hides nothing.
+        if document.root.scene.is_some() {
+            let message = "the file names a default scene but has no scenes; all nodes are shown";
+            document.context.warn(message.to_owned());
         }
-        document
-            .context
-            .warn("the file names a default scene but has no scenes; all nodes are shown".to_owned());
-        None
-    } else {
-        default?
-    };
+        return Ok(vec![true; count]);
+    }
+    let default = document.resolve_optional(document.root.scene, "scene", || "scene".to_owned())?;
     let mut roots = Vec::new();
-    for (i, scene) in document.scenes.iter().enumerate() {
-        let nodes = scene.indices("nodes", "node", count)?;
+    for (i, scene) in scenes.iter().enumerate() {
+        let nodes = resolve_nodes(document, &scene.nodes, &label("scene", i, &scene.name), "nodes")?;
         if default.unwrap_or(0) == i {
             roots = nodes;
         }
-    }
-    if document.scenes.is_empty() {
-        return Ok(vec![true; count]);
     }
     let mut shown = vec![false; count];
     let mut stack = Vec::new();
