@@ -8,8 +8,8 @@ use crate::{Aabb, Pose, PosedCamera, Projection, Scene};
 const ORBIT_YFOV: f32 = 0.873;
 /// Seconds for one turn of the computed orbit.
 const ORBIT_PERIOD_S: f64 = 20.0;
-/// Distance of the orbit around an object, in bounding radii.
-const TURNTABLE_RADII: f32 = 1.6;
+/// Distance of the orbit around an object, in bounding radii: just fits the sphere into the field of view.
+const TURNTABLE_RADII: f32 = 2.4;
 /// Elevation of the orbit around an object, radians (20°).
 const TURNTABLE_ELEVATION: f32 = 0.349;
 /// Free distance that makes a place a room, as a part of the scene's diagonal.
@@ -340,7 +340,7 @@ mod tests {
                 let to_middle = Vec3::ZERO - camera.eye_world();
                 assert!(Vec3::from(forward).dot(to_middle) > 0.0);
                 if !inside {
-                    assert!((to_middle.length() - 1.6 * 3_f32.sqrt()).abs() < 1e-4);
+                    assert!((to_middle.length() - TURNTABLE_RADII * 3_f32.sqrt()).abs() < 1e-4);
                 }
             }
         }

@@ -49,11 +49,9 @@ impl Clusters {
         &mut self,
         scene: &Scene,
         pose: &Pose,
-        layout: &PointLayout,
         anchors: &[Anchor],
         chosen: impl Fn(usize) -> bool + Sync,
     ) {
-        debug_assert_eq!(layout.len(), anchors.len());
         self.clusters.par_iter_mut().filter(|c| chosen(c.instance as usize)).for_each(|c| {
             let posed = anchors[c.first as usize..c.end as usize]
                 .iter()
@@ -67,13 +65,11 @@ impl Clusters {
         &self,
         scene: &Scene,
         pose: &Pose,
-        layout: &PointLayout,
         anchors: &[Anchor],
         moved: &[bool],
         swept: &[Aabb],
         reach_m: f32,
     ) -> Vec<u32> {
-        debug_assert_eq!(layout.len(), anchors.len());
         self.clusters
             .par_iter()
             .flat_map_iter(|c| {

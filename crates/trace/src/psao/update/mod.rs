@@ -103,7 +103,7 @@ impl Updater {
             .collect();
         let store = PointStore::new(layout, visibility).expect("one value was traced for each point");
         let mut clusters = Clusters::new(store.layout());
-        clusters.refresh(scene, pose, store.layout(), &anchors, |_| true);
+        clusters.refresh(scene, pose, &anchors, |_| true);
         let bounds_world = instance_bounds(scene, pose);
         Ok(Updater { params, anchors, store, patterns, clusters, pose: pose.clone(), bounds_world })
     }
@@ -147,10 +147,9 @@ impl Updater {
             }
             self.bounds_world[instance] = bounds_world;
         }
-        self.clusters.refresh(scene, pose, self.store.layout(), &self.anchors, |i| moved[i]);
+        self.clusters.refresh(scene, pose, &self.anchors, |i| moved[i]);
         let reach = reach_m(self.params.radius_m, &swept);
-        let layout = self.store.layout().clone();
-        let candidates = self.clusters.select(scene, pose, &layout, &self.anchors, &moved, &swept, reach);
+        let candidates = self.clusters.select(scene, pose, &self.anchors, &moved, &swept, reach);
         let report = self.trace_and_publish(scene, pose, tracer, &candidates);
         self.pose = pose.clone();
         report
@@ -159,7 +158,7 @@ impl Updater {
     /// Traces all points, whether or not anything moved: what [`Updater::step`] must agree with.
     pub fn step_all(&mut self, scene: &Scene, pose: &Pose, tracer: &Tracer) -> UpdateReport {
         let all: Vec<u32> = (0..self.anchors.len() as u32).collect();
-        self.clusters.refresh(scene, pose, self.store.layout(), &self.anchors, |_| true);
+        self.clusters.refresh(scene, pose, &self.anchors, |_| true);
         self.bounds_world = instance_bounds(scene, pose);
         let report = self.trace_and_publish(scene, pose, tracer, &all);
         self.pose = pose.clone();
