@@ -1,6 +1,6 @@
 //! Cameras and what they project.
 
-use glam::{Affine3A, Mat3, Mat4, Vec3, Vec4};
+use glam::{Affine3A, Mat3, Mat4, Vec2, Vec3, Vec4};
 
 /// A camera of the scene, fixed to a node: it looks along −Z, Y up.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,7 +72,9 @@ impl PosedCamera {
     pub fn clip_from_view(&self, aspect: f32) -> Mat4 {
         match self.projection {
             Projection::Perspective { yfov, near } => {
-                let f = 1.0 / (0.5 * yfov).tan();
+                // The cotangent; glam's angles are the same on every machine.
+                let half = Vec2::from_angle(0.5 * yfov);
+                let f = half.x / half.y;
                 Mat4::from_cols(
                     Vec4::new(f / aspect, 0.0, 0.0, 0.0),
                     Vec4::new(0.0, f, 0.0, 0.0),

@@ -178,3 +178,20 @@ fn wrap(i: i64, n: i64, mode: Wrap) -> usize {
     };
     i as usize
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn coordinates_far_outside_are_sampled() {
+        let image = Image { name: String::new(), width: 2, height: 3, rgba8: vec![[0, 51, 102, 255]; 6] };
+        for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+            let texture = Texture { image: 0, wrap_u: wrap, wrap_v: wrap, filter: Filter::Linear };
+            for (u, v) in [(1e30, 1e30), (-1e30, 1e30), (1e30, -1e30), (0.3, 1e30)] {
+                let texel = texture.sample(&image, Vec2::new(u, v));
+                assert!(texel.abs_diff_eq(Vec4::new(0.0, 0.2, 0.4, 1.0), 1e-6), "{wrap:?} {u} {v}: {texel}");
+            }
+        }
+    }
+}

@@ -360,6 +360,28 @@ fn formats_and_names() {
     assert!(matches!(error, LoadError::Read { .. }) && error.to_string().contains("b.bin"), "{error}");
 }
 
+#[test]
+fn valid_json_that_the_typed_document_refuses_is_mended() {
+    let scene = loaded(&glb(
+        r#"{"asset":{"version":"2.0"},"scene":1.0,"scenes":[{},{"nodes":[1e0]}],"nodes":[{},{"camera":0.0}],
+        "cameras":[{"type":"perspective","perspective":{"yfov":1.5,"znear":1}}],
+        "animations":[{"samplers":[],"channels":[{"sampler":0,"target":{"path":"pointer"}}]}]}"#,
+        &[],
+    ));
+    assert_eq!(scene.nodes[1].camera, Some(0));
+    assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings);
+    // An error beside it is the one that is told.
+    let error = load_bytes(&glb(r#"{"asset":{"version":"2.0"},"scene":0.0,"nodes":[{"mesh":"x"}]}"#, &[]))
+        .unwrap_err();
+    assert!(
+        matches!(error, LoadError::Schema { .. }) && error.to_string().contains("nodes[0].mesh"),
+        "{error}"
+    );
+    // Of another version, whose document looks different.
+    let error = load("a.gltf", br#"{"asset":{"version":"1.0"},"meshes":{}}"#, &NoFiles).unwrap_err();
+    assert!(matches!(error, LoadError::Version { .. }), "{error}");
+}
+
 /// Remembers what it was asked for.
 struct Asked(std::cell::RefCell<Vec<String>>);
 

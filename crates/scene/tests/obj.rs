@@ -54,6 +54,25 @@ fn objects_win_over_groups() {
 }
 
 #[test]
+fn faces_of_different_kinds_stay_apart() {
+    let text = format!(
+        "{SQUARE}v 2 0 0 1 0.5 0\nvt 0.5 0\nvn 0 0 -1\nf 1/1 2/1 3/1\nf 1//1 3//1 4//1\nf 2 5 3/1\nf 1/1 2/1 3/1\n"
+    );
+    let scene = loaded(&text, &NoFiles);
+    let mesh = &scene.meshes[0];
+    assert_eq!((mesh.parts.len(), mesh.triangles.len()), (1, 4));
+    let corner = |t: usize, k: usize| mesh.triangles[t][k] as usize;
+    // In the order of the file: with texture coordinates, with normals, with neither, with texture coordinates again.
+    for (t, uv, normal) in [(0, 0.5, 1.0), (1, 0.0, -1.0), (2, 0.0, 1.0), (3, 0.5, 1.0)] {
+        for k in 0..3 {
+            assert_eq!((mesh.uvs[0][corner(t, k)].x, mesh.normals[corner(t, k)].z), (uv, normal), "{t} {k}");
+        }
+    }
+    assert_eq!(mesh.colors[corner(2, 1)].to_array(), [1.0, 0.5, 0.0, 1.0]);
+    assert_eq!(mesh.colors[corner(0, 1)].to_array(), [1.0; 4], "vertices without a color are white");
+}
+
+#[test]
 fn material_libraries() {
     let mtl = "newmtl red # comment\nKd 1 0 0\nKe 2 3 4\nd 0.5\nnewmtl leaf\nKd 0 0 0\nmap_Kd -s 1 1 1 my leaf.png\n\
                map_d mask.png\nmap_Ke gone.png\nKe oops\n";

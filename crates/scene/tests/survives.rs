@@ -4,7 +4,7 @@
 mod common;
 
 use common::{Builder, use_scene};
-use dapple_scene::{NoFiles, load};
+use dapple_scene::{Files, NoFiles, load};
 use proptest::prelude::*;
 
 /// A small file that uses nearly everything the loader reads.
@@ -47,6 +47,15 @@ fn everything() -> Vec<u8> {
             "channels":[{{"sampler":0,"target":{{"node":2,"path":"translation"}}}},
             {{"sampler":1,"target":{{"node":0,"path":"rotation"}}}},{{"sampler":2,"target":{{"node":3,"path":"weights"}}}}]}}]"#
     ))
+}
+
+/// The same bytes for every file.
+struct Same<'a>(&'a [u8]);
+
+impl Files for Same<'_> {
+    fn read(&self, _uri: &str, _limit_bytes: u64) -> std::io::Result<Vec<u8>> {
+        Ok(self.0.to_vec())
+    }
 }
 
 fn survive(name: &str, bytes: &[u8]) {
@@ -107,6 +116,39 @@ fn every_number_in_the_json_changed() {
     }
 }
 
+/// Text that makes the OBJ library itself panic or fail where it is not checked before.
+#[test]
+fn obj_text_that_the_library_cannot_take() {
+    const VERTICES: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\n";
+    for faces in [
+        "f 1/-2/1 2/-2/1 3/-2/1",
+        "f 1/9223372036854775807 2/1 3/1",
+        "f 1//-2 2//-2 3//-2",
+        "f 1/1/1/1 2/1/1/1 3/1/1/1",
+        "f",
+        "f 0 0 0",
+        "usemtl\nf 1 2 3",
+        "usemtl\tb\nf 1 2 3",
+        "g\nf 1 2 3",
+        "mtllib\nf 1 2 3",
+        "v 1 2 3 0\nf 1 2 4",
+        "v 1 2 3 0.5 0.5\nf 1 2 4",
+        "v 1 2 3 1 0 0\nf 1 2 4",
+        "v 1 2 3 1 0 0 1\nf 1 2 4",
+        "vt 1\nf 1/2 2/2 3/2",
+        "f 1 2/1 3//1",
+    ] {
+        survive("x.obj", format!("{VERTICES}{faces}\n").as_bytes());
+    }
+    let obj = b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n";
+    for line in ["Kd 0.25", "Ke 1 0", "Ka", "Ks 1", "d", "Ns x", "illum 999", "newmtl", "map_Kd", "bump"] {
+        let mtl = format!("newmtl a\nKd 0.5 0.5 0.5\n{line}\nd 0.5\n");
+        let scene = load("x.obj", obj, &Same(mtl.as_bytes())).unwrap_or_else(|error| panic!("{error}"));
+        use_scene(&scene, line);
+        assert_eq!(scene.materials[0].base_color_factor.w, 0.5, "{line}: one bad line costs only itself");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -123,6 +165,13 @@ proptest! {
     #[test]
     fn obj_like_text(text in "([vf]|vt|vn|g|o|usemtl|mtllib|#|\\\\|\n|[-/. 0-9]| |\n){0,120}") {
         survive("x.obj", text.as_bytes());
+    }
+
+    #[test]
+    fn mtl_like_text(text in "(newmtl a|newmtl|K[aksde]|d|Tr|P[rm]|N[si]|illum|(map_)?(Kd|Ke|d|Bump|bump)|#|\n|[-. 0-9]{1,4}| |\n){0,60}") {
+        let obj = b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n";
+        let scene = load("x.obj", obj, &Same(text.as_bytes())).unwrap_or_else(|error| panic!("{error}"));
+        use_scene(&scene, &text);
     }
 
     #[test]

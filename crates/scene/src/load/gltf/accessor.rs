@@ -142,16 +142,17 @@ fn read_uint(component: ComponentType, bytes: &[u8], offset: usize) -> u32 {
 }
 
 impl Document<'_> {
-    /// Checks an accessor for a use at `at` and gives access to its elements.
+    /// Checks an accessor that property `key` of the object `at` refers to, and gives access to its elements.
     pub(super) fn elements(
         &self,
         index: Index<Accessor>,
-        at: String,
+        at: &str,
+        key: &str,
         allowed: Allowed,
     ) -> Result<Elements<'_>, LoadError> {
-        let index = self.resolve(index, "accessor", || at.clone())?;
+        let index = self.resolve(index, "accessor", at, key)?;
         let accessor = &self.root.accessors[index];
-        let at = format!("{at} (accessor {index})");
+        let at = format!("{at}.{key} (accessor {index})");
         let (Checked::Valid(kind), Checked::Valid(component)) = (accessor.type_, accessor.component_type)
         else {
             let problem = "its type or componentType is none of glTF's; export the file again";

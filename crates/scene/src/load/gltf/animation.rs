@@ -86,7 +86,7 @@ fn read_channel(
         return Err(context.out_of_range(at, "sampler", s as u64, samplers.len()));
     };
     let sampler_at = format!("{at}.samplers[{s}]");
-    let node = document.resolve(channel.target.node, "node", || format!("{channel_at}.target.node"))?;
+    let node = document.resolve(channel.target.node, "node", channel_at, "target.node")?;
     let property = match channel.target.path {
         Checked::Valid(Property::Translation) => ChannelTarget::Translation,
         Checked::Valid(Property::Rotation) => ChannelTarget::Rotation,
@@ -117,8 +117,8 @@ fn read_channel(
             Interpolation::Linear
         }
     };
-    let input = document.elements(sampler.input, format!("{sampler_at}.input"), TIMES)?;
-    let output = document.elements(sampler.output, format!("{sampler_at}.output"), allowed)?;
+    let input = document.elements(sampler.input, &sampler_at, "input", TIMES)?;
+    let output = document.elements(sampler.output, &sampler_at, "output", allowed)?;
     let values_per_key = if interpolation == Interpolation::CubicSpline { 3 * width } else { width };
     let keys = input.count;
     if keys == 0 {

@@ -61,12 +61,13 @@ impl<'a> Document<'a> {
         Ok(Document { context, root, buffers: read_buffers(context, root, glb_bin)? })
     }
 
-    /// The place of a referenced object in its list.
+    /// The place in its list of an object that property `key` of the object `at` refers to.
     pub(super) fn resolve<T>(
         &self,
         index: Index<T>,
         what: &'static str,
-        at: impl FnOnce() -> String,
+        at: &str,
+        key: &str,
     ) -> Result<usize, LoadError>
     where
         Root: AsRef<[T]>,
@@ -75,7 +76,7 @@ impl<'a> Document<'a> {
         if index < count {
             Ok(index)
         } else {
-            Err(self.context.out_of_range(at(), what, index as u64, count))
+            Err(self.context.out_of_range(format!("{at}.{key}"), what, index as u64, count))
         }
     }
 
@@ -84,12 +85,13 @@ impl<'a> Document<'a> {
         &self,
         index: Option<Index<T>>,
         what: &'static str,
-        at: impl FnOnce() -> String,
+        at: &str,
+        key: &str,
     ) -> Result<Option<usize>, LoadError>
     where
         Root: AsRef<[T]>,
     {
-        index.map(|index| self.resolve(index, what, at)).transpose()
+        index.map(|index| self.resolve(index, what, at, key)).transpose()
     }
 
     /// Numbers that can be computed with.
@@ -117,10 +119,10 @@ impl<'a> Document<'a> {
         index: Index<buffer::View>,
         at: &str,
     ) -> Result<(&[u8], Option<usize>), LoadError> {
-        let index = self.resolve(index, "buffer view", || format!("{at}.bufferView"))?;
+        let index = self.resolve(index, "buffer view", at, "bufferView")?;
         let view = &self.root.buffer_views[index];
         let at = label("buffer view", index, &view.name);
-        let buffer_index = self.resolve(view.buffer, "buffer", || format!("{at}.buffer"))?;
+        let buffer_index = self.resolve(view.buffer, "buffer", &at, "buffer")?;
         let buffer = &self.buffers[buffer_index];
         if buffer.failed.get() {
             return Err(buffer.failure.take().unwrap_or_else(|| {
@@ -147,7 +149,7 @@ impl<'a> Document<'a> {
             }
         }
         for i in 0..self.root.accessors.len() as u32 {
-            if let Err(flaw) = self.elements(Index::new(i), "unused".to_owned(), ANY) {
+            if let Err(flaw) = self.elements(Index::new(i), "accessors", &i.to_string(), ANY) {
                 self.context.warn(format!("not needed by the scene, but wrong: {flaw}"));
             }
         }

@@ -35,8 +35,7 @@ fn read_images(document: &Document<'_>, scene: &mut Scene) -> Result<Vec<Option<
     let mut indices = Vec::new();
     for (i, source) in document.root.images.iter().enumerate() {
         let at = label("image", i, &source.name);
-        let view =
-            document.resolve_optional(source.buffer_view, "buffer view", || format!("{at}.bufferView"))?;
+        let view = document.resolve_optional(source.buffer_view, "buffer view", &at, "bufferView")?;
         let reference = source.uri.as_deref();
         let key = match (reference, view) {
             (Some(reference), _) => format!("uri {reference}"),
@@ -100,12 +99,12 @@ fn read_textures(
     let mut indices = Vec::new();
     for (i, source) in document.root.textures.iter().enumerate() {
         let at = label("texture", i, &source.name);
-        let sampler = document.resolve_optional(source.sampler, "sampler", || format!("{at}.sampler"))?;
+        let sampler = document.resolve_optional(source.sampler, "sampler", &at, "sampler")?;
         let image = if source.source.value() == NO_SOURCE {
             document.context.warn(format!("{at} has no PNG or JPEG image; materials do without it"));
             None
         } else {
-            images[document.resolve(source.source, "image", || format!("{at}.source"))?]
+            images[document.resolve(source.source, "image", &at, "source")?]
         };
         let Some(image) = image else {
             indices.push(None);
@@ -234,7 +233,7 @@ impl Reader<'_> {
         transform: Option<&TextureTransform>,
     ) -> Result<Option<TextureRef>, LoadError> {
         let (document, at) = (self.document, format!("{}.{key}", self.at));
-        let texture = document.resolve(index, "texture", || format!("{at}.index"))?;
+        let texture = document.resolve(index, "texture", &at, "index")?;
         let mut image_from_uv = Affine2::IDENTITY;
         if let Some(transform) = transform {
             uv_set = transform.tex_coord.unwrap_or(uv_set);

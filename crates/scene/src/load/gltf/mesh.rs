@@ -49,7 +49,7 @@ fn read_mesh(
     for (p, primitive) in source.primitives.iter().enumerate() {
         let at = format!("{at}.primitives[{p}]");
         let material = document
-            .resolve_optional(primitive.material, "material", || format!("{at}.material"))?
+            .resolve_optional(primitive.material, "material", &at, "material")?
             .map_or(default_material, |material| material as u32);
         let Some(piece) = (Reader { document, primitive, at: &at }).piece()? else { continue };
         target_counts.push(piece.morph_targets.len());
@@ -189,7 +189,7 @@ impl Reader<'_> {
         count: Option<usize>,
     ) -> Result<Option<Elements<'_>>, LoadError> {
         let Some(accessor) = accessor else { return Ok(None) };
-        let elements = self.document.elements(accessor, format!("{}.{key}", self.at), allowed)?;
+        let elements = self.document.elements(accessor, self.at, key, allowed)?;
         if let Some(count) = count
             && elements.count != count
         {

@@ -127,10 +127,10 @@ fn read_skin(document: &Document<'_>, source: &SourceSkin, index: usize) -> Resu
     if joints.is_empty() {
         return Err(LoadError::Missing { file: context.file(), at, property: "joints" });
     }
-    document.resolve_optional(source.skeleton, "node", || format!("{at}.skeleton"))?;
+    document.resolve_optional(source.skeleton, "node", &at, "skeleton")?;
     let mut inverse_bind_matrices = vec![Affine3A::IDENTITY; joints.len()];
     if let Some(accessor) = source.inverse_bind_matrices {
-        let matrices = document.elements(accessor, format!("{at}.inverseBindMatrices"), MATRICES)?;
+        let matrices = document.elements(accessor, &at, "inverseBindMatrices", MATRICES)?;
         if matrices.count < joints.len() {
             let problem = format!("holds {} matrices for {} joints", matrices.count, joints.len());
             return Err(context.invalid(matrices.at.as_str(), format!("{problem}; export the file again")));
@@ -159,7 +159,13 @@ fn resolve_nodes(
     key: &str,
 ) -> Result<Vec<u32>, LoadError> {
     let resolve = |(i, node): (usize, &Index<SourceNode>)| {
-        document.resolve(*node, "node", || format!("{at}.{key}[{i}]")).map(|node| node as u32)
+        let (node, count) = (node.value(), document.root.nodes.len());
+        let place = || format!("{at}.{key}[{i}]");
+        if node < count {
+            Ok(node as u32)
+        } else {
+            Err(document.context.out_of_range(place(), "node", node as u64, count))
+        }
     };
     nodes.iter().enumerate().map(resolve).collect()
 }
@@ -178,12 +184,11 @@ fn read_node(
     let scene = &mut draft.scene;
     let at = label("node", index, &source.name);
     let light = source.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref());
-    let light = document.resolve_optional(light.map(|l| l.light), "light", || {
-        format!("{at}.extensions.KHR_lights_punctual")
-    })?;
-    let camera = document.resolve_optional(source.camera, "camera", || format!("{at}.camera"))?;
-    let mesh = document.resolve_optional(source.mesh, "mesh", || format!("{at}.mesh"))?;
-    let mut skin = document.resolve_optional(source.skin, "skin", || format!("{at}.skin"))?;
+    let light =
+        document.resolve_optional(light.map(|l| l.light), "light", &at, "extensions.KHR_lights_punctual")?;
+    let camera = document.resolve_optional(source.camera, "camera", &at, "camera")?;
+    let mesh = document.resolve_optional(source.mesh, "mesh", &at, "mesh")?;
+    let mut skin = document.resolve_optional(source.skin, "skin", &at, "skin")?;
     let mut morph_weights = source.weights.clone().unwrap_or_default();
     document.check_numbers(&at, "weights", &morph_weights)?;
     let targets = mesh.map_or(0, |mesh| scene.meshes[mesh].morph_targets.len());
@@ -301,7 +306,7 @@ fn shown_nodes(document: &Document<'_>, draft: &Draft) -> Result<Vec<bool>, Load
         }
         return Ok(vec![true; count]);
     }
-    let default = document.resolve_optional(document.root.scene, "scene", || "scene".to_owned())?;
+    let default = document.resolve_optional(document.root.scene, "scene", "the file", "scene")?;
     let mut roots = Vec::new();
     for (i, scene) in scenes.iter().enumerate() {
         let nodes = resolve_nodes(document, &scene.nodes, &label("scene", i, &scene.name), "nodes")?;
