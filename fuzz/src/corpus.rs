@@ -1,5 +1,7 @@
-//! The seeds that fuzzing starts from: one of each thing a stream can carry. Written to `corpus/` by
+//! The seeds that fuzzing starts from: one of each thing that a stream or a scene file can carry. Written to `corpus/` by
 //! `cargo run -p dapple-fuzz --example corpus`.
+
+mod scenes;
 
 use dapple_store::points::{Change, PointStore};
 use dapple_stream::{Frame, FrameHeader, FrameKind, Limits, Publisher, PublisherConfig};
@@ -60,5 +62,8 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
     calls.extend([5, 0, 0, 0, 0, 0, 2, 0, 0, 0, 7, 1, 0, 9, 6, 0, 0, 0, 0, 3, 0, 1, 2, 4, 7, 0, 0]);
     calls.extend([1, 1, 0, 1, 0, 77, 3, 0, 0, 64, 7, 1, 0, 5, 1, 0, 1, 0]);
     seeds.push(("session_ops", "each-call".to_owned(), calls));
+
+    let scenes = [("scene.glb", scenes::glb()), ("scene.gltf", scenes::gltf()), ("scene.obj", scenes::obj())];
+    seeds.extend(scenes.map(|(name, bytes)| ("load_scene", name.to_owned(), bytes)));
     seeds
 }

@@ -6,14 +6,17 @@
 pub mod corpus;
 mod frame;
 mod input;
+mod scene;
 mod session;
 
 pub use frame::decode_frame;
 pub use input::Random;
+pub use scene::load_scene;
 pub use session::session_ops;
 
 /// A target: its name, which is that of its folder in `corpus/`, and its body.
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 2] = [("decode_frame", decode_frame), ("session_ops", session_ops)];
+pub const TARGETS: [Target; 3] =
+    [("decode_frame", decode_frame), ("session_ops", session_ops), ("load_scene", load_scene)];

@@ -81,3 +81,21 @@ fn corpus_holds_the_generated_seeds() {
         assert!(found.is_some_and(|(_, found)| found == bytes), "{target}/{name}: run the example `corpus`");
     }
 }
+
+/// The seeds of scene files load, or their mutations would hardly get anywhere.
+#[test]
+fn scene_seeds_load_with_everything_in_them() {
+    for (_, name, bytes) in dapple_fuzz::corpus::seeds().into_iter().filter(|seed| seed.0 == "load_scene") {
+        let scene = dapple_scene::load(&name, &bytes, &dapple_scene::NoFiles).expect("a sound file");
+        let warnings: Vec<&str> = scene.warnings.iter().map(|w| w.message.as_str()).collect();
+        if name.ends_with(".obj") {
+            assert_eq!(scene.triangle_count(), 5, "{warnings:?}");
+            continue;
+        }
+        assert_eq!(warnings, Vec::<&str>::new(), "{name}");
+        let counts = [scene.meshes.len(), scene.instances.len(), scene.skins.len(), scene.materials.len()];
+        assert_eq!(counts, [2, 3, 1, 3], "{name}");
+        let counts = [scene.images.len(), scene.lights.len(), scene.cameras.len(), scene.animations.len()];
+        assert_eq!(counts, [1, 3, 2, 1], "{name}");
+    }
+}
