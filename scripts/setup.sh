@@ -4,7 +4,7 @@
 # scripts/setup.sh          for `make demo`: make, a C and C++ compiler (FLIP and zstd come as source) and Rust
 # scripts/setup.sh test     for `make test`: the same, and git, rustfmt and clippy
 #
-# Rust itself is not installed for you; the message says how.
+# Rust comes from the system's rustup package where there is one; otherwise the message says how to get it.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -43,9 +43,16 @@ how="Get it from https://rustup.rs:
     curl --proto '=https' --tlsv1.2 -sSf https://sh.rustup.rs | sh -s -- -y
 then open a new shell, or run: . \"\$HOME/.cargo/env\""
 
+# Where the system packages rustup, that is how Rust comes; otherwise the message says how.
+if ! has cargo && has apt-get && apt-cache show rustup >/dev/null 2>&1 && [ "$(id -u)" -eq 0 ]; then
+    echo "setup: installing rustup and the stable toolchain"
+    DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends rustup </dev/null
+    rustup default stable
+fi
+
 has cargo && has rustc || stop "Rust $wanted or newer is needed, and there is none on the PATH." "$how"
 
-found=$(rustc --version | cut -d' ' -f2)
+found=$(rustc --version 2>/dev/null | cut -d' ' -f2) || stop "rustc does not run: with rustup, choose a toolchain: rustup default stable"
 oldest=$(printf '%s\n' "$wanted" "${found%%-*}" | sort -V | head -n 1)
 if [ "$oldest" != "$wanted" ]; then
     if has rustup; then how="Run: rustup update stable"; fi

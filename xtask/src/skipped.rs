@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-const MARK: &str = "skipped:";
+const MARK: &str = "skipped: ";
 
 /// The lines that say `skipped:` in a JUnit report, each once, with the number of tests that say it.
 pub(crate) fn skipped_lines(junit_xml: &str) -> Vec<String> {

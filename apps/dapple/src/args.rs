@@ -59,7 +59,7 @@ pub(crate) struct SceneChoice {
     #[arg(long, value_name = "NAME")]
     pub(crate) builtin: Option<String>,
     /// Tessellation of a built-in scene, above 0 to 1.
-    #[arg(long, value_name = "D", requires = "builtin")]
+    #[arg(long, value_name = "D")]
     pub(crate) detail: Option<f32>,
     /// Animation to play: a name or an index in the file [default: the first].
     #[arg(long, value_name = "NAME|INDEX")]
@@ -71,7 +71,7 @@ pub(crate) struct SceneChoice {
 pub(crate) struct VisibilityArgs {
     /// Occlusion distance in metres, or `auto`: 2 % of the scene's diagonal, for files that are not in metres
     /// (points are then counted per (radius / 0.6)² instead of per m²).
-    #[arg(long, value_name = "METRES|auto", default_value = "0.6")]
+    #[arg(long, value_name = "METRES|auto", default_value = "0.6", allow_hyphen_values = true)]
     pub(crate) radius: Radius,
     /// Rays a point, 1 to 256.
     #[arg(long, value_name = "N", default_value_t = 64)]
@@ -88,31 +88,33 @@ pub(crate) struct VisibilityArgs {
 pub(crate) struct EvalArgs {
     #[command(flatten)]
     pub(crate) scene: SceneChoice,
-    /// Methods to compare: psao, psao-hat (the paper's kernel on the same points), rtao-R (R rays a pixel), none.
+    /// Methods to compare: psao, psao-hat (the paper's kernel on the same points; psao-hat-1.5: with 1.5 times its
+    /// radius), rtao-R (R rays a pixel), none [default: psao,psao-hat,rtao-16,none].
     #[arg(long, value_delimiter = ',', value_name = "METHOD,…")]
     pub(crate) methods: Option<Vec<Method>>,
-    /// Pictures compared, evenly spread over the path.
+    /// Pictures compared, evenly spread over the path [default: 4; 2 without a scene].
     #[arg(long, value_name = "N")]
     pub(crate) frames: Option<u32>,
-    /// Picture size in pixels.
+    /// Picture size in pixels [default: 480x270].
     #[arg(long, value_name = "WxH")]
     pub(crate) size: Option<Size>,
-    /// Points spawned a square metre (half are kept); several are evaluated in one run.
+    /// Points spawned a square metre (half are kept); several are evaluated in one run
+    /// [default: 512; 256 without a scene].
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
     pub(crate) points: Option<Vec<f32>>,
-    /// Server updates a second; several are evaluated in one run.
+    /// Server updates a second; several are evaluated in one run [default: 15].
     #[arg(long, value_delimiter = ',', value_name = "H,…")]
     pub(crate) hz: Option<Vec<f64>>,
     /// Camera path by name (an unknown name lists them) [default: the scene's first].
     #[arg(long, value_name = "NAME")]
     pub(crate) path: Option<String>,
-    /// Seconds of the path that are played [default: all of it].
+    /// Seconds of the path that are played [default: all of it; 2 without a scene].
     #[arg(long, value_name = "S")]
     pub(crate) seconds: Option<f64>,
-    /// Rays a pixel of the ray-traced truth.
+    /// Rays a pixel of the ray-traced truth [default: 512; 128 without a scene].
     #[arg(long, value_name = "R")]
     pub(crate) reference_rays: Option<u32>,
-    /// Samples a pixel along each axis (2 is 4× supersampling).
+    /// Samples a pixel along each axis; 2 is 4× supersampling [default: 2].
     #[arg(long, value_name = "N")]
     pub(crate) supersample: Option<u32>,
     #[command(flatten)]
@@ -121,7 +123,10 @@ pub(crate) struct EvalArgs {
     #[arg(long, value_name = "DIR", default_value = "out/eval")]
     pub(crate) out: PathBuf,
     /// Run the small built-in setting and fail if similarity or bytes leave their bounds.
-    #[arg(long, conflicts_with_all = ["scene", "builtin", "methods", "points", "hz"])]
+    #[arg(long, conflicts_with_all = [
+        "scene", "builtin", "detail", "animation", "methods", "frames", "size", "points", "hz", "path", "seconds",
+        "reference_rays", "supersample", "radius", "point_rays", "threshold", "seed",
+    ])]
     pub(crate) smoke: bool,
     /// Threads; 0 is one for each core.
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -139,7 +144,7 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_enum, default_value = "beauty")]
     pub(crate) view: View,
     /// Animation time in seconds.
-    #[arg(long, value_name = "T", default_value_t = 0.0)]
+    #[arg(long, value_name = "T", default_value_t = 0.0, allow_hyphen_values = true)]
     pub(crate) time: f64,
     /// A camera of the scene by name, or one given as eye=X,Y,Z,target=X,Y,Z,fov=DEGREES (vertical)
     /// [default: the scene's first camera path].
@@ -206,18 +211,23 @@ pub(crate) enum View {
 }
 
 /// A method as `eval` names it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Method {
     Psao,
-    PsaoHat,
-    Rtao { rays: u32 },
+    /// With the radius in units of the spacing.
+    PsaoHat {
+        radius: f32,
+    },
+    Rtao {
+        rays: u32,
+    },
     None,
 }
 
 impl Method {
     /// Whether it depends on points and server rate.
     pub(crate) fn uses_points(self) -> bool {
-        matches!(self, Method::Psao | Method::PsaoHat)
+        matches!(self, Method::Psao | Method::PsaoHat { .. })
     }
 }
 
@@ -225,7 +235,8 @@ impl std::fmt::Display for Method {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Method::Psao => write!(f, "psao"),
-            Method::PsaoHat => write!(f, "psao-hat"),
+            Method::PsaoHat { radius: 1.0 } => write!(f, "psao-hat"),
+            Method::PsaoHat { radius } => write!(f, "psao-hat-{radius}"),
             Method::Rtao { rays } => write!(f, "rtao-{rays}"),
             Method::None => write!(f, "none"),
         }
@@ -238,15 +249,22 @@ impl FromStr for Method {
     fn from_str(s: &str) -> Result<Self, Self::Err> {
         match s {
             "psao" => Ok(Method::Psao),
-            "psao-hat" => Ok(Method::PsaoHat),
+            "psao-hat" => Ok(Method::PsaoHat { radius: 1.0 }),
             "none" => Ok(Method::None),
             "rtao" => Ok(Method::Rtao { rays: 16 }),
-            _ => match s.strip_prefix("rtao-").and_then(|r| r.parse().ok()) {
-                Some(rays @ 1..=65536) => Ok(Method::Rtao { rays }),
-                _ => {
-                    Err("known methods: psao, psao-hat, rtao-R with R from 1 to 65536 (rtao-16), none".into())
+            _ => {
+                let rays = s.strip_prefix("rtao-").and_then(|r| r.parse().ok());
+                let radius = s.strip_prefix("psao-hat-").and_then(|r| r.parse::<f32>().ok());
+                match (rays, radius) {
+                    (Some(rays @ 1..=65536), _) => Ok(Method::Rtao { rays }),
+                    (_, Some(radius)) if (0.1..=8.0).contains(&radius) => Ok(Method::PsaoHat { radius }),
+                    _ => Err(
+                        "known methods: psao, psao-hat, psao-hat-F with its radius times F from 0.1 to 8, \
+                              rtao-R with R from 1 to 65536 (rtao-16), none"
+                            .into(),
+                    ),
                 }
-            },
+            }
         }
     }
 }

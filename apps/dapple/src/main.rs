@@ -39,6 +39,9 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Render(args) => args.threads,
         Command::Scene(_) => 0,
     };
+    if threads > 1024 {
+        anyhow::bail!("--threads is {threads}, must be 0 (one for each core) to 1024");
+    }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
     pool.install(|| match cli.command {
         Command::Eval(args) => eval::run(&args),

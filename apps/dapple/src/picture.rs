@@ -17,6 +17,12 @@ pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
         std::fs::create_dir_all(folder)
             .with_context(|| format!("cannot create the folder {}", folder.display()))?;
     }
+    // What is written to follows links, and a device or pipe is written into, not replaced.
+    let resolved = std::fs::canonicalize(path);
+    let path = resolved.as_deref().unwrap_or(path);
+    if std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
+        return std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()));
+    }
     let name = path.file_name().with_context(|| format!("{} names no file", path.display()))?;
     let mut partial = name.to_owned();
     partial.push(format!(".{}.tmp", std::process::id()));

@@ -64,6 +64,10 @@ fn check(args: &RenderArgs) -> Result<()> {
     if !(1..=65536).contains(&args.rays) {
         bail!("--rays is {}, must be 1 to 65536", args.rays);
     }
+    let extension = args.output.extension().unwrap_or_default();
+    if !extension.eq_ignore_ascii_case("png") && !extension.is_empty() {
+        bail!("{} would hold a PNG: name it .png", args.output.display());
+    }
     if !args.time.is_finite() {
         bail!("--time must be a finite number of seconds");
     }
@@ -86,7 +90,7 @@ fn visibility(
 ) -> Result<Option<Vec<f32>>> {
     let kernel = match method {
         RenderMethod::None => return Ok(None),
-        RenderMethod::Rtao => return Ok(Some(traced(args, loaded, drawn))),
+        RenderMethod::Rtao => return Ok(Some(traced(args, loaded, drawn)?)),
         RenderMethod::Psao => Kernel::default(),
         RenderMethod::PsaoHat => Kernel::Hat(Hat::default()),
     };
@@ -94,8 +98,8 @@ fn visibility(
     Ok(Some(client.visibility(drawn, &kernel)))
 }
 
-fn traced(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn) -> Vec<f32> {
-    let (radius_m, _) = source::resolve_radius(&loaded.scene, &args.visibility);
+fn traced(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn) -> Result<Vec<f32>> {
+    let (radius_m, _) = source::resolve_radius(&loaded.scene, &args.visibility)?;
     let tracer = Tracer::new(&loaded.scene, &drawn.pose);
     let (indices, sites) = sites(&loaded.scene, drawn);
     let rays = args.rays.div_ceil(args.supersample * args.supersample);
@@ -107,13 +111,13 @@ fn traced(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn) -> Vec<f32> {
     for (index, value) in indices.into_iter().zip(traced) {
         visibility[index] = value;
     }
-    visibility
+    Ok(visibility)
 }
 
 /// A server brought to the picture's time, and a client that has joined it.
 fn light(args: &RenderArgs, loaded: &Loaded) -> Result<(Server, Client)> {
     let scene = &loaded.scene;
-    let (radius_m, density_factor) = source::resolve_radius(scene, &args.visibility);
+    let (radius_m, density_factor) = source::resolve_radius(scene, &args.visibility)?;
     let config = ServerConfig {
         generate: GenerateParams {
             points_per_m2: args.points * density_factor,

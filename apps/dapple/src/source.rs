@@ -21,14 +21,21 @@ pub(crate) struct Loaded {
 
 /// Loads what the arguments name; `fallback` is the built-in scene and detail used when they name nothing.
 pub(crate) fn load(choice: &SceneChoice, fallback: Option<(&str, f32)>) -> Result<Loaded> {
+    if choice.scene.is_some() && choice.detail.is_some() {
+        bail!(
+            "--detail is for built-in scenes; {} is a file",
+            choice.scene.as_deref().unwrap_or(Path::new("")).display()
+        );
+    }
     let (mut scene, title) = match (&choice.scene, &choice.builtin, fallback) {
         (Some(path), _, _) => (load_file(path)?, path.display().to_string()),
         (None, Some(name), _) => load_builtin(name, choice.detail.unwrap_or(1.0))?,
-        (None, None, Some((name, detail))) => load_builtin(name, detail)?,
+        (None, None, Some((name, detail))) => load_builtin(name, choice.detail.unwrap_or(detail))?,
         (None, None, None) => bail!("no scene given: name a .gltf, .glb or .obj file, or --builtin atrium"),
     };
     if let Some(animation) = &choice.animation {
-        scene.active_animation = Some(find_animation(&scene, animation)?);
+        let animation = find_animation(&scene, animation)?;
+        scene.set_active_animation(Some(animation));
     }
     for warning in &scene.warnings {
         tracing::warn!("{}: {}", title, warning.message);
@@ -90,11 +97,13 @@ pub(crate) fn find_camera(
 ) -> Result<dapple_scene::PosedCamera> {
     if let Some(text) = text.filter(|t| t.contains('=')) {
         let camera: CameraText = text.parse().map_err(anyhow::Error::msg)?;
-        return Ok(dapple_scene::PosedCamera::look_at(
-            camera.eye,
-            camera.target,
-            camera.fov_degrees.to_radians(),
-        ));
+        let mut posed =
+            dapple_scene::PosedCamera::look_at(camera.eye, camera.target, camera.fov_degrees.to_radians());
+        // A scene in other units than metres may lie nearer than the usual near plane.
+        if let dapple_scene::Projection::Perspective { near, .. } = &mut posed.projection {
+            *near = near.min((1e-3 * scene.bounds_world(&scene.pose(time_s)).diagonal()).max(1e-6));
+        }
+        return Ok(posed);
     }
     let path = find_path(scene, text)
         .context("--camera takes a camera path's name or eye=X,Y,Z,target=X,Y,Z,fov=DEGREES")?;
@@ -102,12 +111,16 @@ pub(crate) fn find_camera(
 }
 
 /// The occlusion distance in metres, and the factor on points per m² that goes with it.
-pub(crate) fn resolve_radius(scene: &Scene, args: &VisibilityArgs) -> (f32, f32) {
+pub(crate) fn resolve_radius(scene: &Scene, args: &VisibilityArgs) -> Result<(f32, f32)> {
     match args.radius {
-        Radius::Metres(m) => (m, 1.0),
+        Radius::Metres(m) => Ok((m, 1.0)),
         Radius::Auto => {
             let radius = scene.auto_radius_m();
-            (radius, (0.6 / radius) * (0.6 / radius))
+            let factor = (0.6 / radius) * (0.6 / radius);
+            if !(factor.is_finite() && factor > 0.0) {
+                bail!("--radius auto: the scene's extent gives a radius of {radius} m; give one in metres");
+            }
+            Ok((radius, factor))
         }
     }
 }

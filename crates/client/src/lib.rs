@@ -56,7 +56,9 @@ impl Drawn {
 
 impl Client {
     /// A client that accepts only frames made for this scene.
-    pub fn new(scene: Arc<Scene>, limits: Limits) -> Client {
+    /// Of `limits`, the number of sets is raised to the scene's instances, which is the most a server can send.
+    pub fn new(scene: Arc<Scene>, mut limits: Limits) -> Client {
+        limits.max_sets = limits.max_sets.max(u32::try_from(scene.instances.len()).unwrap_or(u32::MAX));
         let subscriber = Subscriber::new(Some(scene.hash().0), limits);
         Client { scene, subscriber, index: None }
     }

@@ -29,16 +29,17 @@ pub(super) fn html(results: &Results) -> String {
 
 fn summary(page: &mut String, results: &Results) {
     let run = &results.run;
-    let best = results.rows.iter().filter(|r| r.kbit_per_s.is_some()).max_by(|a, b| {
-        a.visibility_psnr_db.unwrap_or(f64::MAX).total_cmp(&b.visibility_psnr_db.unwrap_or(f64::MAX))
-    });
+    let best =
+        results.rows.iter().filter(|r| r.kbit_per_s.is_some() && r.compared_pixels > 0).max_by(|a, b| {
+            a.visibility_psnr_db.unwrap_or(f64::MAX).total_cmp(&b.visibility_psnr_db.unwrap_or(f64::MAX))
+        });
     if let Some(row) = best {
         let _ = writeln!(
             page,
-            "<p class=\"lead\">Best from points: <b>{}</b> ({}), {} dB of visibility at <b>{:.1} kbit/s</b>.</p>",
+            "<p class=\"lead\">Best from points: <b>{}</b> ({}), visibility {} at <b>{:.1} kbit/s</b>.</p>",
             escape(&row.method),
             escape(&table::setting(&row.params)),
-            row.visibility_psnr_db.map_or("equal,".to_owned(), |v| format!("{v:.2}")),
+            row.visibility_psnr_db.map_or("equal to the truth".to_owned(), |v| format!("{v:.2} dB")),
             row.kbit_per_s.unwrap_or(0.0),
         );
     }

@@ -51,6 +51,7 @@ pub(crate) struct Row {
     pub(crate) method: String,
     pub(crate) params: Params,
     pub(crate) visibility_psnr_db: Option<f64>,
+    pub(crate) compared_pixels: u64,
     pub(crate) psnr_db: Option<f64>,
     pub(crate) ssim: f64,
     pub(crate) flip: f64,
@@ -123,6 +124,11 @@ pub(crate) struct PooledError {
 }
 
 impl PooledError {
+    /// The weight of everything that was added.
+    pub(crate) fn count(&self) -> f64 {
+        self.count
+    }
+
     /// Adds one picture's PSNR (peak 1), weighed by `samples`.
     pub(crate) fn add(&mut self, psnr_db: f64, samples: f64) {
         let mse = if psnr_db.is_finite() { 10f64.powf(-psnr_db / 10.0) } else { 0.0 };

@@ -250,8 +250,9 @@ impl Line {
         let start = Instant::now();
         let visibility = match (self.method, self.pair) {
             (Method::Psao, Some(pair)) => Some(pairs[pair].client.visibility(drawn, &Kernel::default())),
-            (Method::PsaoHat, Some(pair)) => {
-                Some(pairs[pair].client.visibility(drawn, &Kernel::Hat(Hat::default())))
+            (Method::PsaoHat { radius }, Some(pair)) => {
+                let hat = Hat { radius, ..Hat::default() };
+                Some(pairs[pair].client.visibility(drawn, &Kernel::Hat(hat)))
             }
             (Method::Rtao { rays }, _) => {
                 let rays = settings.rays_per_sample(rays);
@@ -304,6 +305,7 @@ impl Line {
             method: self.method.to_string(),
             params,
             visibility_psnr_db: self.visibility_error.psnr_db(),
+            compared_pixels: self.visibility_error.count() as u64,
             psnr_db: self.error.psnr_db(),
             ssim: mean(|f| f.ssim),
             flip: mean(|f| f.flip),
@@ -311,7 +313,7 @@ impl Line {
             snapshot_bytes: pair.map(|p| p.snapshot_bytes),
             points: pair.map(|p| p.server.store().layout().len() as u64),
             rays: self.rays + pair.map_or(0, |p| p.rays),
-            server_ms: pair.map(|p| per_tick(p.server_seconds, p)),
+            server_ms: pair.filter(|p| p.ticks > 0).map(|p| per_tick(p.server_seconds, p)),
             client_ms: 1e3 * self.reconstruct_seconds / count + apply_ms,
             frames: self.frames,
         }

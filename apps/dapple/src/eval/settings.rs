@@ -40,20 +40,27 @@ impl Settings {
         let whole = path_seconds(&loaded.scene, &path);
         // A file's own scene gets all of its path; the built-in setting a short piece, to stay under a minute.
         let small = args.scene.scene.is_none() && args.scene.builtin.is_none();
-        let seconds = args.seconds.unwrap_or(if small { 2.0 } else { whole }).min(whole);
+        let wanted = args.seconds.unwrap_or(if small { 2.0 } else { whole });
+        if wanted > whole {
+            tracing::warn!("--seconds {wanted}: the path {} lasts {whole:.2} s, which are played", path.name);
+        }
+        let seconds = wanted.min(whole);
         let frames = args.frames.unwrap_or(if small { 2 } else { 4 });
         let size = args.size.unwrap_or(Size { width: 480, height: 270 });
-        let default_methods = vec![Method::Psao, Method::PsaoHat, Method::Rtao { rays: 16 }, Method::None];
-        let (radius_m, density_factor) = source::resolve_radius(&loaded.scene, &args.visibility);
+        let default_methods =
+            vec![Method::Psao, Method::PsaoHat { radius: 1.0 }, Method::Rtao { rays: 16 }, Method::None];
+        let (radius_m, density_factor) = source::resolve_radius(&loaded.scene, &args.visibility)?;
         let settings = Settings {
-            methods: args.methods.clone().unwrap_or(default_methods),
+            methods: distinct(args.methods.clone().unwrap_or(default_methods)),
             path,
             seconds,
             frame_times_s: frame_times(frames, seconds),
             size,
             supersample: args.supersample.unwrap_or(2),
-            points_per_m2: args.points.clone().unwrap_or_else(|| vec![if small { 256.0 } else { 512.0 }]),
-            hz: args.hz.clone().unwrap_or_else(|| vec![15.0]),
+            points_per_m2: distinct(
+                args.points.clone().unwrap_or_else(|| vec![if small { 256.0 } else { 512.0 }]),
+            ),
+            hz: distinct(args.hz.clone().unwrap_or_else(|| vec![15.0])),
             reference_rays: args.reference_rays.unwrap_or(if small { 128 } else { 512 }),
             radius_m,
             density_factor,
@@ -114,6 +121,16 @@ impl Settings {
             self.radius_m,
         )
     }
+}
+
+/// The list without repetitions, in order.
+fn distinct<T: PartialEq>(list: Vec<T>) -> Vec<T> {
+    list.into_iter().fold(Vec::new(), |mut kept, item| {
+        if !kept.contains(&item) {
+            kept.push(item);
+        }
+        kept
+    })
 }
 
 /// How long a path lasts; a camera that stands still watches the animation once, or ten seconds of a still scene.

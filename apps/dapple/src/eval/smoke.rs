@@ -48,6 +48,10 @@ pub(super) fn check(results: &Results) -> Result<()> {
         let per_point = snapshot / row.points.unwrap_or(1).max(1) as f64;
         let method = bound.method;
         check(
+            format!("{method}: {} pixels compared, more than 0", row.compared_pixels),
+            row.compared_pixels > 0,
+        );
+        check(
             format!(
                 "{method}: visibility PSNR {visibility:.2} dB, at least {}",
                 bound.least_visibility_psnr_db

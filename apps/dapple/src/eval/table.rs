@@ -29,7 +29,7 @@ pub(super) const EXPLANATIONS: [&str; 12] = [
     "bits of all updates over the path, snapshot not counted",
     "bytes of the snapshot that a new client receives",
     "points in the store",
-    "rays traced in the whole run, millions",
+    "rays traced in the whole run, millions, the test for points inside geometry not counted",
     "mean wall time of a server step: pose, trees, rays, encoding",
     "mean wall time of reconstruction on the CPU and of applying an update",
 ];
@@ -38,22 +38,26 @@ pub(super) const EXPLANATIONS: [&str; 12] = [
 pub(super) fn cells(row: &Row) -> [String; 12] {
     let dash = || "–".to_owned();
     let number = |value: Option<f64>, digits: usize| value.map_or_else(dash, |v| format!("{v:.digits$}"));
-    // Without a finite PSNR the pictures are equal.
     let psnr = |value: Option<f64>| value.map_or_else(|| "equal".to_owned(), |v| format!("{v:.2}"));
+    let visibility = if row.compared_pixels > 0 { psnr(row.visibility_psnr_db) } else { dash() };
     [
         row.method.clone(),
         setting(&row.params),
-        psnr(row.visibility_psnr_db),
+        visibility,
         psnr(row.psnr_db),
         format!("{:.4}", row.ssim),
         format!("{:.4}", row.flip),
         number(row.kbit_per_s, 1),
-        row.snapshot_bytes.map_or_else(dash, |b| format!("{:.0} kB", b as f64 / 1e3)),
+        row.snapshot_bytes.map_or_else(dash, bytes),
         row.points.map_or_else(dash, |p| p.to_string()),
         format!("{:.1}", row.rays as f64 / 1e6),
         number(row.server_ms, 2),
         format!("{:.1}", row.client_ms),
     ]
+}
+
+fn bytes(count: u64) -> String {
+    if count < 1000 { format!("{count} B") } else { format!("{:.0} kB", count as f64 / 1e3) }
 }
 
 /// What distinguishes rows of one method.

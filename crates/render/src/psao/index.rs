@@ -10,13 +10,13 @@ use crate::gbuffer::RestSurface;
 pub struct PointIndex {
     spacing_m: f32,
     len: usize,
-    /// Position of each instance's grid in `sets`, by instance.
-    set_of_instance: Vec<Option<u32>>,
+    /// In order of instance.
     sets: Vec<IndexedSet>,
 }
 
 #[derive(Clone, Debug)]
 struct IndexedSet {
+    instance: u32,
     first: u32,
     grid: CellGrid,
     positions_rest: Vec<Vec3>,
@@ -29,21 +29,19 @@ const CELL_IN_SPACINGS: f32 = 1.0;
 impl PointIndex {
     /// Decodes a layout. About 40 bytes a point.
     pub fn new(layout: &PointLayout) -> PointIndex {
-        let instances = layout.sets().last().map_or(0, |s| s.instance as usize + 1);
-        let mut set_of_instance = vec![None; instances];
         let mut sets = Vec::with_capacity(layout.sets().len());
-        for (at, set) in layout.sets().iter().enumerate() {
-            set_of_instance[set.instance as usize] = Some(at as u32);
+        for set in layout.sets() {
             let positions_rest: Vec<Vec3> =
                 (0..set.len()).map(|i| set.position_rest(i, layout.quantum_m())).collect();
             sets.push(IndexedSet {
+                instance: set.instance,
                 first: set.first,
                 grid: CellGrid::new(&positions_rest, layout.spacing_m() * CELL_IN_SPACINGS),
                 positions_rest,
                 normals_rest: set.normals.iter().map(|n| n.unpack()).collect(),
             });
         }
-        PointIndex { spacing_m: layout.spacing_m(), len: layout.len(), set_of_instance, sets }
+        PointIndex { spacing_m: layout.spacing_m(), len: layout.len(), sets }
     }
 
     /// Number of points.
@@ -62,7 +60,7 @@ impl PointIndex {
     }
 
     fn set(&self, instance: u32) -> Option<(usize, &IndexedSet)> {
-        let at = (*self.set_of_instance.get(instance as usize)?)? as usize;
+        let at = self.sets.binary_search_by_key(&instance, |set| set.instance).ok()?;
         Some((at, &self.sets[at]))
     }
 

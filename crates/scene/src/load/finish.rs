@@ -7,7 +7,7 @@ use glam::{Mat3, Vec3};
 
 use super::context::{Context, is_usable};
 use super::{LoadError, normals};
-use crate::{Instance, Mesh, Scene};
+use crate::{Instance, Mesh, Pose, Scene};
 
 /// A scene under construction: node indices are those of the file, in any order.
 #[derive(Default)]
@@ -130,26 +130,41 @@ fn set_rest_scale<'l>(
         return Err(context.not_finite(format!("the place in the world of {}", label_of(node as u32))));
     }
     let pose = scene.pose(0.0);
-    let mut scales = Vec::with_capacity(scene.instances.len());
     for (i, instance) in scene.instances.iter().enumerate() {
         let bounds = scene.instance_bounds_world(&pose, i);
         let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
         if !is_usable(largest) {
             return Err(context.not_finite(format!("the place in the world of {}", label_of(instance.node))));
         }
-        scales.push(if instance.skin.is_some() {
-            let mesh = &scene.meshes[instance.mesh as usize];
-            let (posed, bind) = (area(mesh, scene.vertex_positions(&pose, i)), area(mesh, &mesh.positions));
+    }
+    scene.set_rest_scales(&pose);
+    Ok(())
+}
+
+impl Scene {
+    /// Chooses the animation that [`Scene::pose`] plays (`None`: nothing moves), and brings rest space
+    /// ([`Instance::rest_from_mesh`]) to its scale. An index out of range counts as `None`.
+    pub fn set_active_animation(&mut self, animation: Option<u32>) {
+        self.active_animation = animation.filter(|&i| (i as usize) < self.animations.len());
+        self.set_rest_scales(&self.pose(0.0));
+    }
+
+    /// Sets `rest_from_mesh` of every instance from the pose at time 0.
+    fn set_rest_scales(&mut self, pose: &Pose) {
+        let scale_of = |(i, instance): (usize, &Instance)| {
+            if instance.skin.is_none() {
+                return Mat3::from(pose.world_from_node[instance.node as usize].matrix3);
+            }
+            let mesh = &self.meshes[instance.mesh as usize];
+            let (posed, bind) = (area(mesh, self.vertex_positions(pose, i)), area(mesh, &mesh.positions));
             let scale = (posed / bind).sqrt() as f32;
             Mat3::from_diagonal(Vec3::splat(if scale.is_finite() && scale > 0.0 { scale } else { 1.0 }))
-        } else {
-            Mat3::from(pose.world_from_node[instance.node as usize].matrix3)
-        });
+        };
+        let scales: Vec<Mat3> = self.instances.iter().enumerate().map(scale_of).collect();
+        for (instance, scale) in self.instances.iter_mut().zip(scales) {
+            instance.rest_from_mesh = scale;
+        }
     }
-    for (instance, scale) in scene.instances.iter_mut().zip(scales) {
-        instance.rest_from_mesh = scale;
-    }
-    Ok(())
 }
 
 fn area(mesh: &Mesh, positions: &[Vec3]) -> f64 {

@@ -11,6 +11,7 @@ use crate::codec::{FrameKind, delta_payload, encode_layout, seal, snapshot_paylo
 pub struct PublisherConfig {
     /// Number of the first group. Must exceed every group number that subscribers of this stream can have seen,
     /// also from an earlier process: milliseconds since 1970 at start will do. Default 0.
+    /// At most 2⁶³ − 1; more is taken as that, so that groups cannot run out of numbers.
     pub first_group: u64,
     /// Deltas after which the next change starts a new group, whose snapshot then goes to everyone. Default 0:
     /// only a new layout or [`Publisher::start_group`] does. Relays that keep whole groups for late joiners need
@@ -96,7 +97,8 @@ impl Publisher {
                 }
             }
             old => {
-                let group = old.as_ref().map_or(self.config.first_group, |state| state.group + 1);
+                let group =
+                    old.as_ref().map_or(self.config.first_group.min(u64::MAX >> 1), |state| state.group + 1);
                 let state = State {
                     layout: store.layout().clone(),
                     layout_bytes: encode_layout(store.layout())?,

@@ -10,8 +10,6 @@ pub(super) struct Candidate {
     pub(super) normal: Vec3,
 }
 
-/// [Yuksel2015] sec. 3: exponent of the weight function.
-const ALPHA: i32 = 8;
 /// [Yuksel2015] eq. 5: β and γ of weight limiting.
 const BETA: f32 = 0.65;
 const GAMMA: f32 = 1.5;
@@ -36,44 +34,61 @@ pub(super) fn eliminate(candidates: &[Candidate], keep: usize, r_max: f32) -> Ve
 
     let positions: Vec<Vec3> = candidates.iter().map(|c| c.position).collect();
     let grid = CellGrid::new(&positions, reach);
-    // Each pair's weight is needed twice (sum, subtraction), so neighbours are kept in one flat list.
-    let mut starts = Vec::with_capacity(count + 1);
-    let mut neighbors: Vec<(u32, f32)> = Vec::new();
-    let mut weights = vec![0.0f32; count];
-    let mut near = Vec::new();
-    let mut near_cell = None;
-    for (i, a) in candidates.iter().enumerate() {
-        starts.push(neighbors.len());
-        let cell = grid.cell_of(a.position);
-        if near_cell != Some(cell) {
-            near.clear();
-            grid.gather(cell, 1, &mut near);
-            near_cell = Some(cell);
-        }
-        for &j in &near {
-            let b = &candidates[j as usize];
-            let distance = a.position.distance(b.position);
-            if j as usize == i || distance >= reach || a.normal.dot(b.normal) <= 0.0 {
-                continue;
-            }
-            let limited = distance.max(2.0 * r_min);
-            let weight = (1.0 - limited / reach).max(0.0).powi(ALPHA);
-            weights[i] += weight;
-            neighbors.push((j, weight));
-        }
-    }
-    starts.push(neighbors.len());
-
+    // Pairs are found again when one is eliminated instead of being kept: coincident surfaces have too many.
+    let mut near = Near { grid: &grid, cell: None, indices: Vec::new() };
+    let weights = candidates
+        .iter()
+        .enumerate()
+        .map(|(i, _)| near.neighbors(candidates, i, reach, r_min).map(|(_, weight)| weight).sum())
+        .collect();
     let mut heap = MaxHeap::new(weights);
     for _ in keep..count {
         let worst = heap.pop();
-        for &(j, weight) in &neighbors[starts[worst as usize]..starts[worst as usize + 1]] {
+        for (j, weight) in near.neighbors(candidates, worst as usize, reach, r_min) {
             heap.lower(j, weight);
         }
     }
     let mut kept: Vec<u32> = heap.remaining().to_vec();
     kept.sort_unstable();
     kept
+}
+
+/// Finds the candidates around one; remembers the last cell.
+struct Near<'a> {
+    grid: &'a CellGrid,
+    cell: Option<[i32; 3]>,
+    indices: Vec<u32>,
+}
+
+impl Near<'_> {
+    /// Neighbours of candidate `i` and the weight of each pair ([Yuksel2015] eq. 3, limited below by r_min).
+    fn neighbors<'c>(
+        &'c mut self,
+        candidates: &'c [Candidate],
+        i: usize,
+        reach: f32,
+        r_min: f32,
+    ) -> impl Iterator<Item = (u32, f32)> + 'c {
+        let a = candidates[i];
+        let cell = self.grid.cell_of(a.position);
+        if self.cell != Some(cell) {
+            self.cell = Some(cell);
+            self.indices.clear();
+            self.grid.gather(cell, 1, &mut self.indices);
+        }
+        self.indices.iter().filter_map(move |&j| {
+            let b = &candidates[j as usize];
+            let distance = a.position.distance(b.position);
+            if j as usize == i || distance >= reach || a.normal.dot(b.normal) <= 0.0 {
+                return None;
+            }
+            let base = (1.0 - distance.max(2.0 * r_min) / reach).max(0.0);
+            // The eighth power by squaring: `powi` may round differently from machine to machine.
+            let squared = base * base;
+            let fourth = squared * squared;
+            Some((j, fourth * fourth))
+        })
+    }
 }
 
 /// A binary heap of samples with the heaviest on top, whose weights can be lowered. Ties go to the lower index.

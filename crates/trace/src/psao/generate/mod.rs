@@ -117,14 +117,14 @@ pub fn generate_points(
 
     let r_max = maximum_radius(1.0, 0.5 * f64::from(density)) as f32;
     let spacing_m = 2.0 * r_max;
-    let moving = scene.moving_instances();
+    let sides = Sides::new(scene);
     let done = std::sync::atomic::AtomicUsize::new(0);
     let laid: Vec<LaidInstance> = areas
         .par_iter()
         .enumerate()
         .map(|(instance, area)| {
             let mut laid = lay_instance(scene, instance, area, density, r_max, params.seed);
-            laid.drop_inside(scene, pose, tracer, &moving, params);
+            laid.drop_inside(scene, pose, tracer, &sides, params);
             progress(1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed));
             laid
         })
@@ -176,6 +176,27 @@ impl SurfaceArea {
             }
         }
         SurfaceArea { cumulative, total }
+    }
+}
+
+/// What the inside test knows of each instance.
+struct Sides {
+    /// The animation moves or bends it.
+    moving: Vec<bool>,
+    /// Some of its surface is single-sided, so that its back is an inside.
+    single: Vec<bool>,
+    /// Whether any instance stands still and has such surface.
+    any_still: bool,
+}
+
+impl Sides {
+    fn new(scene: &Scene) -> Sides {
+        let moving = scene.moving_instances();
+        let is_single = |part: &dapple_scene::Part| !scene.materials[part.material as usize].double_sided;
+        let mesh_is_single: Vec<bool> = scene.meshes.iter().map(|m| m.parts.iter().any(is_single)).collect();
+        let single: Vec<bool> = scene.instances.iter().map(|i| mesh_is_single[i.mesh as usize]).collect();
+        let any_still = moving.iter().zip(&single).any(|(moving, single)| !moving && *single);
+        Sides { moving, single, any_still }
     }
 }
 
@@ -260,7 +281,7 @@ impl LaidInstance {
         scene: &Scene,
         pose: &Pose,
         tracer: &Tracer,
-        moving: &[bool],
+        sides: &Sides,
         params: &GenerateParams,
     ) {
         let rays = params.inside_rays.min(256);
@@ -268,21 +289,18 @@ impl LaidInstance {
             return;
         }
         let instance = self.instance;
-        // Whether the back of an instance's surface can mean "inside" for these points.
-        let counts: Vec<bool> = (0..scene.instances.len())
-            .map(|other| {
-                let moves_along = if moving[instance] { other == instance } else { !moving[other] };
-                let mesh = &scene.meshes[scene.instances[other].mesh as usize];
-                moves_along && mesh.parts.iter().any(|p| !scene.materials[p.material as usize].double_sided)
-            })
-            .collect();
-        if !counts.contains(&true) {
+        // Of which instances a back face means "inside" for these points.
+        let counts = |other: usize| match sides.moving[instance] {
+            true => other == instance && sides.single[other],
+            false => !sides.moving[other] && sides.single[other],
+        };
+        if !(counts(instance) || sides.any_still && !sides.moving[instance]) {
             return;
         }
         let is_back = |origin_world: Vec3, direction_world: Vec3| {
             let hit = tracer.closest_hit(&Ray { origin_world, direction_world, t_max: f32::MAX });
             hit.is_some_and(|hit| {
-                hit.back_face && counts[hit.instance as usize] && {
+                hit.back_face && counts(hit.instance as usize) && {
                     let mesh = &scene.meshes[scene.instances[hit.instance as usize].mesh as usize];
                     !scene.materials[mesh.material_of(hit.triangle) as usize].double_sided
                 }
