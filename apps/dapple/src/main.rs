@@ -1,5 +1,8 @@
 //! The command `dapple`: evaluate, render, and write scenes.
 
+#[macro_use]
+mod say;
+
 mod args;
 mod eval;
 mod picture;
@@ -8,6 +11,7 @@ mod render;
 mod scene_command;
 mod source;
 
+use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -21,6 +25,7 @@ fn main() -> ExitCode {
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_target(false)
+        .with_ansi(std::io::stderr().is_terminal())
         .without_time()
         .with_writer(std::io::stderr)
         .init();

@@ -56,7 +56,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<()> {
     };
     let Rgb8Image { width, height, pixels } = &picture;
     write_png(&args.output, *width, *height, pixels)?;
-    println!("wrote {}", args.output.display());
+    say!("wrote {}", args.output.display());
     Ok(())
 }
 

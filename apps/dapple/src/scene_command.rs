@@ -12,7 +12,7 @@ use crate::progress::Bar;
 pub(crate) fn run(args: &SceneArgs) -> Result<()> {
     let Some(name) = &args.name else {
         for scene in builtin::BUILTINS {
-            println!("{:10} {}", scene.name, scene.summary);
+            say!("{:10} {}", scene.name, scene.summary);
         }
         return Ok(());
     };
@@ -21,6 +21,6 @@ pub(crate) fn run(args: &SceneArgs) -> Result<()> {
     drop(wheel);
     let output = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}.glb")));
     write_file(&output, &bytes)?;
-    println!("wrote {} ({:.1} MB)", output.display(), bytes.len() as f64 / 1e6);
+    say!("wrote {} ({:.1} MB)", output.display(), bytes.len() as f64 / 1e6);
     Ok(())
 }

@@ -21,20 +21,20 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
     let settings = Settings::new(args, &loaded)?;
     std::fs::create_dir_all(&args.out)
         .map_err(|e| anyhow::anyhow!("cannot create the folder {}: {e}", args.out.display()))?;
-    println!("{}", settings.summary(&loaded));
+    say!("{}", settings.summary(&loaded));
 
     let results = run::evaluate(&loaded, &settings, &args.out)?;
 
-    println!("\n{}", table::text(&results));
+    say!("\n{}", table::text(&results));
     let json = serde_json::to_vec_pretty(&results)?;
     write_file(&args.out.join("results.json"), &json)?;
     let report = args.out.join("report.html");
     write_file(&report, report::html(&results).as_bytes())?;
     let shown = std::fs::canonicalize(&report).unwrap_or(report);
-    println!("report: {}", shown.display());
+    say!("report: {}", shown.display());
     if args.smoke {
         smoke::check(&results)?;
-        println!("smoke: all bounds hold");
+        say!("smoke: all bounds hold");
     }
     Ok(())
 }
