@@ -1,0 +1,189 @@
+//! A box slides over a floor: what the server publishes, whatever way time takes.
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use dapple_scene::glam::{Mat3, Vec3};
+use dapple_scene::{
+    Animation, Channel, ChannelTarget, Instance, Interpolation, Material, Mesh, Node, Part, Scene,
+};
+use dapple_server::{Progress, Server, ServerConfig, ServerError};
+use dapple_stream::{FrameKind, Limits, Subscriber};
+
+fn mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Mesh {
+    let parts = vec![Part { first_triangle: 0, triangle_count: triangles.len() as u32, material: 0 }];
+    Mesh { normals: vec![Vec3::Y; positions.len()], positions, triangles, parts, ..Mesh::default() }
+}
+
+/// A floor of 4 m × 4 m, and on it a box of half a metre that goes from x = −1 to 1 in two seconds.
+fn scene() -> Arc<Scene> {
+    let corner = |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32);
+    let floor = [0, 4, 5, 1].map(|i| (corner(i) - 0.5) * Vec3::new(4.0, 0.0, 4.0));
+    let cube = (0..8).map(|i| (corner(i) - Vec3::new(0.5, 0.0, 0.5)) * 0.5).collect();
+    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let instance = |i| Instance {
+        node: i,
+        mesh: i,
+        skin: None,
+        casts: true,
+        receives: true,
+        rest_from_mesh: Mat3::IDENTITY,
+    };
+    Arc::new(Scene {
+        nodes: vec![Node::default(), Node::default()],
+        meshes: vec![
+            mesh(floor.to_vec(), vec![[0, 1, 2], [0, 2, 3]]),
+            mesh(cube, faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect()),
+        ],
+        instances: vec![instance(0), instance(1)],
+        materials: vec![Material::default()],
+        animations: vec![Animation {
+            name: "slide".into(),
+            channels: vec![Channel {
+                node: 1,
+                target: ChannelTarget::Translation,
+                interpolation: Interpolation::Linear,
+                times: vec![0.0, 2.0],
+                values: vec![-1.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+            }],
+        }],
+        active_animation: Some(0),
+        ..Scene::default()
+    })
+}
+
+fn config(threshold: u8) -> ServerConfig {
+    let mut config = ServerConfig::default();
+    config.generate.points_per_m2 = 200.0;
+    config.update.threshold = threshold;
+    config
+}
+
+fn start(config: &ServerConfig) -> Server {
+    Server::new(scene(), config, &|_| ()).unwrap()
+}
+
+#[test]
+fn what_is_published_depends_on_the_time_and_not_on_the_way_there() {
+    let at = |times_s: &[f64]| {
+        let mut server = start(&config(0));
+        for &time_s in times_s {
+            server.step(time_s).unwrap();
+        }
+        server.store().clone()
+    };
+    let direct = at(&[1.3]);
+    assert!(direct == at(&[0.1, 0.2, 0.7, 1.3]));
+    assert!(direct == at(&[1.9, 0.0, 1.3, 1.3]));
+    assert!(direct != at(&[0.4]));
+    assert!(at(&[]) == at(&[1.0, 0.0]), "back at the start");
+}
+
+#[test]
+fn only_what_the_box_comes_near_is_traced_and_sent() {
+    let mut server = start(&config(4));
+    let points = server.store().layout().len();
+    let floor = server.store().layout().set_of_instance(0).unwrap().len();
+    assert!((1400..1700).contains(&floor), "half of 200 points a square metre: {floor}");
+    let before = server.store().clone();
+    let pose = server.scene().pose(0.0);
+    let positions = server.positions_world(&pose);
+    assert_eq!(positions.len(), points);
+    let report = server.step(0.5).unwrap();
+    assert!(
+        report.changed > 20 && report.changed <= report.traced && (report.traced as usize) < points * 3 / 4
+    );
+    assert_eq!(report.rays, u64::from(report.traced) * 64);
+    let frame = report.frame.unwrap();
+    assert_eq!(frame.kind, FrameKind::Delta);
+    let mut changed = 0;
+    for (i, (a, b)) in before.visibility().iter().zip(server.store().visibility()).enumerate() {
+        if a == b {
+            continue;
+        }
+        changed += 1;
+        assert!(a.abs_diff(*b) > 4, "point {i} was sent for a change from {a} to {b}");
+        // The box swept from −1.25 to −0.25, and light is blocked within 0.6 m of it.
+        let p = positions[i].unwrap();
+        assert!((-1.9..0.4).contains(&p.x) && p.z.abs() < 0.9, "point {i} at {p}");
+    }
+    assert_eq!(changed, report.changed);
+}
+
+#[test]
+fn a_slow_change_is_sent_once_it_adds_up() {
+    // Each step alone stays below the threshold for almost all points; what was sent last is what counts.
+    let (mut slow, mut exact) = (start(&config(10)), start(&config(0)));
+    for step in 1..=100 {
+        slow.step(f64::from(step) * 0.01).unwrap();
+    }
+    exact.step(1.0).unwrap();
+    let pairs = slow.store().visibility().iter().zip(exact.store().visibility());
+    assert!(pairs.clone().all(|(a, b)| a.abs_diff(*b) <= 10), "no point is further off than the threshold");
+    assert!(pairs.clone().any(|(a, b)| a != b), "and some are off a little");
+}
+
+#[test]
+fn subscribers_are_brought_up_to_date_by_one_snapshot() {
+    let mut server = start(&config(4));
+    let first = server.join().unwrap().unwrap();
+    assert_eq!((first.kind, first.epoch), (FrameKind::Snapshot, 0));
+    assert_eq!(server.join().unwrap().unwrap(), first, "made once");
+    server.step(0.5).unwrap();
+    server.step(1.0).unwrap();
+    let now = server.join().unwrap().unwrap();
+    assert_eq!((now.kind, now.epoch), (FrameKind::Snapshot, 2));
+    let mut subscriber = Subscriber::new(Some(server.scene().hash().0), Limits::default());
+    subscriber.receive(&now.bytes).unwrap();
+    assert!(subscriber.store() == Some(server.store()));
+}
+
+#[test]
+fn progress_reaches_its_end() {
+    let (laid, traced, all) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicUsize::new(0));
+    let server = Server::new(scene(), &config(4), &|progress| match progress {
+        Progress::Laying(done, of) => {
+            assert_eq!(of, 2);
+            laid.fetch_max(done, Ordering::Relaxed);
+        }
+        Progress::Tracing(done, of) => {
+            all.store(of, Ordering::Relaxed);
+            traced.fetch_max(done, Ordering::Relaxed);
+        }
+    })
+    .unwrap();
+    assert_eq!(laid.into_inner(), 2);
+    assert_eq!(all.into_inner(), server.store().layout().len());
+    assert_eq!(traced.into_inner(), server.store().layout().len());
+    assert!((20.0..200.0).contains(&server.bytes_per_point()), "{}", server.bytes_per_point());
+}
+
+#[test]
+fn settings_out_of_range_are_refused_by_name() {
+    let refused = |change: fn(&mut ServerConfig)| {
+        let mut config = config(4);
+        change(&mut config);
+        match Server::new(scene(), &config, &|_| ()) {
+            Err(error @ (ServerError::Generate(_) | ServerError::Update(_))) => error.to_string(),
+            Err(error) => panic!("{error}"),
+            Ok(_) => panic!("it was accepted"),
+        }
+    };
+    assert!(refused(|c| c.generate.points_per_m2 = 0.0).contains("points per m² is 0"));
+    assert!(refused(|c| c.generate.points_per_m2 = f32::NAN).contains("points per m² is NaN"));
+    assert!(refused(|c| c.generate.points_per_m2 = 1e9).contains("lower the density"));
+    assert!(refused(|c| c.update.rays = 0).contains("rays a point is 0"));
+    assert!(refused(|c| c.update.rays = 257).contains("257"));
+    assert!(refused(|c| c.update.radius_m = -1.0).contains("radius is -1 m"));
+}
+
+#[test]
+fn a_scene_without_surfaces_is_served_in_silence() {
+    let mut server = Server::new(Arc::new(Scene::default()), &config(4), &|_| ()).unwrap();
+    let snapshot = server.join().unwrap().unwrap();
+    let mut subscriber = Subscriber::new(None, Limits::default());
+    subscriber.receive(&snapshot.bytes).unwrap();
+    assert!(subscriber.store().unwrap().layout().is_empty());
+    assert!(server.step(1.0).unwrap().frame.is_none());
+}
