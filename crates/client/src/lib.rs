@@ -5,6 +5,9 @@
 //! pose(now), camera ─► g-buffer ─► fragments ───┴─► visibility ─► compose ─► image
 //! ```
 
+#[cfg(feature = "gpu")]
+pub mod viewer;
+
 use std::sync::Arc;
 
 use dapple_render::RenderError;
