@@ -1,4 +1,6 @@
 //! Tests of charts.
 
+mod invariants;
+mod property;
 mod shapes;
 mod truth;
