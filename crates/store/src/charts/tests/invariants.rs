@@ -208,7 +208,9 @@ impl Mesh<'_> {
             let rounding = 1.5 * self.rounding(t, longest) * longest;
             assert!(flat <= rest * 1.0001 + rounding, "edge of {rest} m is {flat} m long in its chart");
             // What is thinner than a third of a texel is drawn together.
-            let thin = if size[0] == 1 || size[1] == 1 { 0.36 * longest } else { 0.0 };
+            let thin = 0.36
+                * step[0].max(step[1])
+                * f64::from(size.iter().filter(|&&n| n == 1).count() as u32).sqrt();
             let least = f64::from(self.params.least_cosine) * rest * 0.9999 - rounding - thin;
             assert!(flat >= least, "edge of {rest} m is {flat} m long in its chart");
         }

@@ -2,5 +2,6 @@
 
 mod invariants;
 mod property;
+mod scenes;
 mod shapes;
 mod truth;
