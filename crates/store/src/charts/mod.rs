@@ -4,6 +4,13 @@
 //! charts of one instance; an *atlas* is where the pages of all instances are placed. A *site* is a texel with the place
 //! on the surface that it stands for.
 
+mod kernel;
+mod neighbours;
 mod set;
+mod weights;
 
+pub use kernel::{Fit, MovingLeastSquares, Weighed};
 pub use set::{ChartError, ChartParams, ChartSet, ChartUv, ChartVertices, PageSize, Site, TEXEL_FRACTION};
+pub use weights::{
+    Candidate, MAX_CANDIDATES, MAX_WEIGHTS, PointNeighbours, TexelWeights, WEIGHT_SUM, WeightParams, Weigher,
+};
