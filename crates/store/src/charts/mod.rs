@@ -5,6 +5,7 @@
 //! on the surface that it stands for.
 
 mod build;
+mod cuts;
 mod flatten;
 mod grow;
 mod kernel;
@@ -18,6 +19,7 @@ mod surface;
 mod tests;
 mod weights;
 
+pub use cuts::{Cuts, CutsError, SetCuts, SiteCut, fingerprint};
 pub use kernel::{Fit, MovingLeastSquares, Weighed};
 pub use set::{
     ChartError, ChartParams, ChartSet, ChartUv, ChartVertices, MOST_TEXELS, PageSize, Site, TEXEL_FRACTION,

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use dapple_store::charts::{PointNeighbours, Site, TexelWeights, WEIGHT_SUM};
+use dapple_store::charts::{PointNeighbours, Site, SiteCut, TexelWeights, WEIGHT_SUM};
 use dapple_store::points::PointSet;
 use rayon::prelude::*;
 
@@ -93,6 +93,7 @@ fn value_of(sum: u16) -> u8 {
 pub(super) struct Builder {
     neighbours: PointNeighbours,
     sites: Vec<Site>,
+    cuts: Vec<SiteCut>,
     texels: u32,
     /// Points a site has; filled as far as weights are made.
     counts: Vec<u8>,
@@ -108,10 +109,17 @@ pub(super) struct Builder {
 }
 
 impl Builder {
-    /// `sites` ascend by texel, and all texels are below `texels`.
-    pub(super) fn new(neighbours: PointNeighbours, set: &PointSet, sites: Vec<Site>, texels: u32) -> Builder {
+    /// `sites` ascend by texel, and all texels are below `texels`; `cuts` ascend by site.
+    pub(super) fn new(
+        neighbours: PointNeighbours,
+        set: &PointSet,
+        sites: Vec<Site>,
+        cuts: Vec<SiteCut>,
+        texels: u32,
+    ) -> Builder {
         Builder {
             neighbours,
+            cuts,
             texels,
             counts: Vec::with_capacity(sites.len()),
             entries: Vec::with_capacity(sites.len() * 5),
@@ -122,6 +130,14 @@ impl Builder {
             encoded_entries: 0,
             table: PointTexels::default(),
         }
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        self.neighbours.memory_bytes()
+            + self.sites.capacity() * size_of::<Site>()
+            + self.counts.capacity()
+            + (self.entries.capacity() + self.at.len() + self.next.len()) * size_of::<u32>()
+            + self.table.bytes()
     }
 
     pub(super) fn sites(&self) -> usize {
@@ -136,18 +152,22 @@ impl Builder {
         self.encoded
     }
 
-    /// Makes the weights of the next sites, at most `most`, in parallel. `cut` gives the points that are ruled out at a site.
-    pub(super) fn weigh(&mut self, set: &PointSet, most: usize, cut: impl Fn(u32) -> u16 + Sync) {
+    /// Makes the weights of the next sites, at most `most`, in parallel.
+    pub(super) fn weigh(&mut self, set: &PointSet, most: usize) {
         let first = self.counts.len();
-        let piece = &self.sites[first..(first + most).min(self.sites.len())];
-        let neighbours = &self.neighbours;
+        let piece = &self.sites[first..first.saturating_add(most).min(self.sites.len())];
+        let (neighbours, cuts) = (&self.neighbours, &self.cuts);
+        let cut = |site: usize| match cuts.binary_search_by_key(&site, |cut| cut.site as usize) {
+            Ok(at) => cuts[at].mask,
+            Err(_) => 0,
+        };
         let weights: Vec<TexelWeights> = piece
             .par_iter()
             .enumerate()
             .with_min_len(256)
             .map_init(
                 || neighbours.weigher(set),
-                |weigher, (i, site)| weigher.weigh(site, cut((first + i) as u32)),
+                |weigher, (i, site)| weigher.weigh(site, cut(first + i)),
             )
             .collect();
         for (site, weights) in piece.iter().zip(&weights) {
@@ -176,7 +196,7 @@ impl Builder {
 
     /// Writes the entries of the next sites, at most `most`, into the tables.
     pub(super) fn encode(&mut self, most: usize) {
-        let end = (self.encoded + most).min(self.sites.len());
+        let end = self.encoded.saturating_add(most).min(self.sites.len());
         for index in self.encoded..end {
             let texel = self.sites[index].texel;
             let count = usize::from(self.counts[index]);
