@@ -6,8 +6,11 @@
 
 mod atlas;
 mod build;
+mod cuts;
 mod flatten;
 mod grow;
+mod kernel;
+mod neighbours;
 mod pack;
 mod per_vertex;
 mod plan;
@@ -16,9 +19,15 @@ mod set;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod weights;
 
 pub use atlas::{Atlas, AtlasError, Placement};
+pub use cuts::{Cuts, CutsError, SetCuts, SiteCut, fingerprint};
+pub use kernel::{Fit, MovingLeastSquares, Weighed};
 pub use plan::{InstanceKey, SceneCharts};
 pub use set::{
     ChartError, ChartParams, ChartSet, ChartUv, ChartVertices, MOST_TEXELS, PageSize, Site, TEXEL_FRACTION,
+};
+pub use weights::{
+    Candidate, MAX_CANDIDATES, MAX_WEIGHTS, PointNeighbours, TexelWeights, WEIGHT_SUM, WeightParams, Weigher,
 };
