@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, bail};
 use cargo_metadata::Metadata;
 
-use crate::{seams, skipped, tidy};
+use crate::{seams, skipped, tidy, wasm};
 
 /// One thing that can pass or fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,6 +21,8 @@ pub(crate) enum Step {
     Seams,
     /// See [`tidy`].
     Tidy,
+    /// The page, with what its tests need.
+    Page,
     /// The whole loop on a small scene, by the command itself.
     Smoke,
     /// Documentation examples.
@@ -37,6 +39,7 @@ impl Step {
             Step::ThinClient => "thin client",
             Step::Seams => "seams",
             Step::Tidy => "tidy",
+            Step::Page => "page",
             Step::Smoke => "smoke evaluation",
             Step::DocTests => "documentation examples",
             Step::Tests => "tests",
@@ -107,12 +110,17 @@ impl Runner {
             ]),
             Step::Seams => seams::check(&self.metadata),
             Step::Tidy => tidy::check(self.root()),
+            Step::Page => self.page(),
             Step::Smoke => {
                 self.cargo(&["run", "--profile=dev", "--quiet", "--package=dapple", "--", "eval", "--smoke"])
             }
             Step::DocTests => self.cargo(&["test", "--doc", "--workspace", "--all-features"]),
             Step::Tests => self.tests(),
         }
+    }
+
+    fn page(&self) -> Result<()> {
+        wasm::build(self.root(), self.metadata.target_directory.as_std_path(), |arguments| self.cargo(arguments))
     }
 
     fn tests(&mut self) -> Result<()> {

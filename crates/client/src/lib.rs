@@ -5,6 +5,7 @@
 //! pose(now), camera ─► g-buffer ─► fragments ───┴─► visibility ─► compose ─► image
 //! ```
 
+pub mod controls;
 #[cfg(feature = "gpu")]
 pub mod viewer;
 
