@@ -1,10 +1,14 @@
 //! Command-line arguments.
 
+mod watch;
+
 use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
+
+pub(crate) use watch::{InspectArgs, LightArgs, RecordArgs};
 
 /// Ray-traced ambient visibility, computed once on a server and streamed to thin clients.
 #[derive(Debug, Parser)]
@@ -25,6 +29,12 @@ pub(crate) enum Command {
     /// Write a built-in scene as a GLB that any glTF viewer opens.
     #[command(after_help = SCENE_EXAMPLES)]
     Scene(SceneArgs),
+    /// Light a scene along its animation and keep the stream in a .dapple file.
+    #[command(after_help = watch::RECORD_EXAMPLES)]
+    Record(RecordArgs),
+    /// Say what is in a .dapple file, and whether it is whole.
+    #[command(after_help = watch::INSPECT_EXAMPLES)]
+    Inspect(InspectArgs),
 }
 
 const EVAL_EXAMPLES: &str = "\
