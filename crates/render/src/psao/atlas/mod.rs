@@ -15,12 +15,11 @@ use std::sync::Arc;
 use dapple_scene::Scene;
 use dapple_store::charts::{ChartError, ChartParams, ChartSet, Cuts, PointNeighbours, WeightParams};
 use dapple_store::points::PointLayout;
-use glam::Vec3;
 
 pub use pages::{DirtyBand, Placement};
 use pages::{Pages, PlacedPages};
-pub use upload::TexelInfo;
 use resolve::{Builder, PointTexels, Sums, add_values};
+pub use upload::TexelInfo;
 
 /// How an atlas is made. Cuts fit only the default texel sizes and kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,7 +116,11 @@ enum Stage {
     Weigh(Box<Builder>),
     Encode(Box<Builder>),
     /// Points before `next` are in the sums.
-    Sum { table: PointTexels, sums: Sums, next: usize },
+    Sum {
+        table: PointTexels,
+        sums: Sums,
+        next: usize,
+    },
 }
 
 /// Texels of work that other steps are worth, in parts of a weighed texel.
@@ -230,13 +233,16 @@ impl VisibilityAtlas {
         let cost = if same.is_some() { 1 } else { mesh.triangles.len() / TRIANGLES_A_TEXEL + 1 };
         let charts = match same {
             Some(charts) => charts,
-            None => match ChartSet::new(&rest_positions(scene, instance_index), &mesh.triangles, &params) {
-                Ok(charts) => Arc::new(charts),
-                Err(error) => {
-                    self.failed.push((instance_index, error));
-                    return (None, cost);
+            None => {
+                match ChartSet::new(&scene.rest_positions(instance_index as usize), &mesh.triangles, &params)
+                {
+                    Ok(charts) => Arc::new(charts),
+                    Err(error) => {
+                        self.failed.push((instance_index, error));
+                        return (None, cost);
+                    }
                 }
-            },
+            }
         };
         (Some(Job { set, charts, charts_key: key, stage: Stage::Sites }), cost)
     }
@@ -250,7 +256,7 @@ impl VisibilityAtlas {
         job.stage = match job.stage {
             Stage::Sites => {
                 let mesh = &scene.meshes[scene.instances[set.instance as usize].mesh as usize];
-                let sites = job.charts.sites(&rest_positions(scene, set.instance), &mesh.triangles);
+                let sites = job.charts.sites(&scene.rest_positions(set.instance as usize), &mesh.triangles);
                 let neighbours = PointNeighbours::new(&layout, set, &self.params.weights);
                 cost = sites.len() / 4 + mesh.triangles.len() / 4;
                 let cuts = self.cuts.as_ref().and_then(|cuts| cuts.for_sites(set.instance, &sites));
@@ -338,7 +344,9 @@ impl VisibilityAtlas {
         let mut at = 0;
         for PointChange { point, old, new } in changes {
             let difference = i32::from(new) - i32::from(old);
-            let in_set = |at: usize| sets.get(at).is_some_and(|s| s.first <= point && point - s.first < s.len() as u32);
+            let in_set = |at: usize| {
+                sets.get(at).is_some_and(|s| s.first <= point && point - s.first < s.len() as u32)
+            };
             if !in_set(at) {
                 // Empty sets share their first point with the one after them, which is the last of those.
                 at = sets.partition_point(|s| s.first <= point).saturating_sub(1);
@@ -391,10 +399,4 @@ impl Job {
 fn chart_params(spacing_m: f32, moves: bool, mirrored: bool, texel_factor: f32) -> ChartParams {
     let params = ChartParams::for_spacing(spacing_m, moves);
     ChartParams { texel_m: params.texel_m * texel_factor, mirrored, ..params }
-}
-
-/// The vertices of an instance at rest, metres.
-fn rest_positions(scene: &Scene, instance: u32) -> Vec<Vec3> {
-    let placed = &scene.instances[instance as usize];
-    scene.meshes[placed.mesh as usize].positions.iter().map(|&p| placed.rest_from_mesh * p).collect()
 }
