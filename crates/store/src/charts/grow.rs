@@ -124,7 +124,8 @@ impl Grower<'_> {
     fn grow(&mut self, seed: u32, normal: DVec3) -> Grown {
         let surface = self.surface;
         let frame = Frame::with_normal(surface.corner_places(seed as usize)[0], normal);
-        let [mut low, mut high] = bounds(frame, surface.corner_places(seed as usize));
+        let corners = surface.corner_places(seed as usize).map(|p| frame.project(p));
+        let [mut low, mut high] = bounds(corners);
         let steps = f64::from(self.params.max_side - 1);
         let texel = self.params.texel.max((high - low).max_element() / steps);
         let longest = texel * steps;
@@ -132,7 +133,7 @@ impl Grower<'_> {
         self.cells.clear();
         let mut triangles = vec![seed];
         self.seen[seed as usize] = self.stamp;
-        self.claim(seed, frame, texel);
+        self.claim(seed, corners, &frame, texel);
         let mut next = 0;
         while next < triangles.len() {
             for neighbour in surface.neighbours[triangles[next] as usize] {
@@ -144,9 +145,12 @@ impl Grower<'_> {
                 if surface.normals[n].dot(normal) < self.params.least_cosine {
                     continue;
                 }
-                let [own_low, own_high] = bounds(frame, surface.corner_places(n));
+                let corners = surface.corner_places(n).map(|p| frame.project(p));
+                let [own_low, own_high] = bounds(corners);
                 let (new_low, new_high) = (low.min(own_low), high.max(own_high));
-                if (new_high - new_low).max_element() > longest || !self.claim(neighbour, frame, texel) {
+                if (new_high - new_low).max_element() > longest
+                    || !self.claim(neighbour, corners, &frame, texel)
+                {
                     continue;
                 }
                 (low, high) = (new_low, new_high);
@@ -159,9 +163,9 @@ impl Grower<'_> {
 
     /// Takes the texels of a triangle; false, and nothing is taken, if one of them is at another height already.
     ///
-    /// Two places of a surface inside the cone can differ in height by no more than its steepness times their distance.
-    fn claim(&mut self, triangle: u32, frame: Frame, texel: f64) -> bool {
-        let corners = self.surface.corner_places(triangle as usize).map(|p| frame.project(p) / texel);
+    /// `corners` are those of the triangle in the frame. Two places of a surface inside the cone can differ in height by no more than its steepness times their distance.
+    fn claim(&mut self, triangle: u32, corners: [DVec3; 3], frame: &Frame, texel: f64) -> bool {
+        let corners = corners.map(|p| p / texel);
         let normal = self.surface.normals[triangle as usize];
         let [nx, ny, nz] = frame.axes.map(|axis| axis.dot(normal));
         let height_at =
@@ -185,8 +189,8 @@ impl Grower<'_> {
     }
 }
 
-fn bounds(frame: Frame, corners: [DVec3; 3]) -> [DVec2; 2] {
-    let [a, b, c] = corners.map(|p| frame.project(p).truncate());
+fn bounds(corners: [DVec3; 3]) -> [DVec2; 2] {
+    let [a, b, c] = corners.map(|c| c.truncate());
     [a.min(b).min(c), a.max(b).max(c)]
 }
 
