@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::grow::{Frame, Grown};
+use super::set::TEXEL_FRACTION;
 use super::surface::Surface;
 
 /// A side shorter than this, in texels, gets one texel.
@@ -37,6 +38,14 @@ impl Flat {
         let last = DVec2::new(f64::from(self.size[0] - 1), f64::from(self.size[1] - 1));
         // One texel: everything lies at its centre.
         p.clamp(DVec2::ZERO, last)
+    }
+
+    /// The same in steps of 1 / [`TEXEL_FRACTION`] texel, from the border of the first texel: what a [`ChartUv`] counts.
+    ///
+    /// [`ChartUv`]: super::ChartUv
+    pub(super) fn snapped_texel_of(&self, place: DVec3) -> [u16; 2] {
+        let at = (self.texel_of(place) + 0.5) * f64::from(TEXEL_FRACTION);
+        [at.x.round() as u16, at.y.round() as u16]
     }
 
     /// The place over a texel on the plane through `corner` with normal `normal` (which faces the chart).

@@ -19,7 +19,7 @@ fn timing() {
             );
             let t1 = b.elapsed();
             let b = std::time::Instant::now();
-            let f: Vec<_> = g.iter().map(|g| super::super::flatten::flatten(&s, g, 1024).size).collect();
+            let f: Vec<_> = g.iter().map(|g| super::super::flatten::flatten(&s, &g.0, 1024).size).collect();
             let t2 = b.elapsed();
             let b = std::time::Instant::now();
             super::super::pack::pack(&f, 1024);
