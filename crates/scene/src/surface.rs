@@ -1,6 +1,6 @@
 //! What a place on a mesh looks like: texture coordinates and opacity.
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec4};
 
 use crate::{AlphaMode, Mesh, Scene, TextureRef};
 
@@ -37,12 +37,6 @@ impl Scene {
     pub fn sample(&self, texture: &TextureRef, uv: Vec2) -> Vec4 {
         let sampler = &self.textures[texture.texture as usize];
         sampler.sample(&self.images[sampler.image as usize], texture.image_from_uv.transform_point2(uv))
-    }
-
-    /// The vertices of an instance at rest ([`Instance::rest_from_mesh`](crate::Instance::rest_from_mesh)), metres.
-    pub fn rest_positions(&self, instance: usize) -> Vec<Vec3> {
-        let placed = &self.instances[instance];
-        self.meshes[placed.mesh as usize].positions.iter().map(|&p| placed.rest_from_mesh * p).collect()
     }
 
     /// Whether a place on a mesh is cut out by its material's alpha: below the cutoff of a mask, or

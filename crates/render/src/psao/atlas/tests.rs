@@ -16,12 +16,17 @@ fn noise(a: u32, b: u32) -> u32 {
     h ^ h >> 15
 }
 
+fn rest_positions(scene: &Scene, instance: usize) -> Vec<Vec3> {
+    let placed = &scene.instances[instance];
+    scene.meshes[placed.mesh as usize].positions.iter().map(|&p| placed.rest_from_mesh * p).collect()
+}
+
 /// Points on all surfaces, about one for each square of `spacing` / 1.1.
 fn lay(scene: &Scene, spacing: f32) -> Arc<PointLayout> {
     let quantum = spacing / 32.0;
     let mut sets = Vec::new();
     for (index, instance) in scene.instances.iter().enumerate() {
-        let positions = scene.rest_positions(index);
+        let positions = rest_positions(scene, index);
         let mut points = Vec::new();
         for (t, triangle) in scene.meshes[instance.mesh as usize].triangles.iter().enumerate() {
             let [a, b, c] = triangle.map(|v| positions[v as usize]);
@@ -176,7 +181,7 @@ fn a_gradient_is_kept_on_a_plane() {
     let set = &layout.sets()[0];
     let value = |i: usize| (slope(set.position_rest(i, layout.quantum_m())) * 255.0).round() as u8;
     let atlas = complete(&scene, &layout, &(0..set.len()).map(value).collect::<Vec<_>>());
-    let positions = scene.rest_positions(0);
+    let positions = rest_positions(&scene, 0);
     for i in 0..1000u32 {
         let triangle = i % 2;
         let (mut u, mut v) = (noise(i, 5) as f32 / 4.3e9, noise(i, 6) as f32 / 4.3e9);

@@ -20,7 +20,7 @@ impl VisibilityAtlas {
         } else {
             let (page, x, y) = ready.charts.texel_at(triangle as usize, barycentrics);
             let Some(place) = ready.placements.get(usize::from(page)) else { return 1.0 };
-            self.bilinear(place.layer, place.x as f32 + x, place.y as f32 + y, fade)
+            self.bilinear(u32::from(place.layer), f32::from(place.x) + x, f32::from(place.y) + y, fade)
         };
         (value / 255.0).clamp(0.0, 1.0)
     }
@@ -40,7 +40,7 @@ impl VisibilityAtlas {
     fn corner_value(&self, ready: &ReadySet, uv: ChartUv, fade: f32) -> f32 {
         let Some(place) = ready.placements.get(usize::from(uv.page)) else { return 255.0 };
         let texel = |at: u16| u32::from(at / TEXEL_FRACTION);
-        self.mix(place.layer, place.x + texel(uv.x), place.y + texel(uv.y), fade)
+        self.mix(u32::from(place.layer), u32::from(place.x) + texel(uv.x), u32::from(place.y) + texel(uv.y), fade)
     }
 
     /// Four texels around a place, which is in texels with centres at halves.

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use dapple_scene::{Pose, Scene};
 use dapple_store::charts::{
-    Candidate, ChartParams, ChartSet, Cuts, PointNeighbours, SetCuts, Site, SiteCut, WeightParams,
+    Candidate, ChartParams, ChartSet, Cuts, InstanceKey, PointNeighbours, SetCuts, Site, SiteCut, WeightParams,
     fingerprint,
 };
 use dapple_store::points::PointLayout;
@@ -39,7 +39,7 @@ pub fn find_cuts(
     let still = tracer.only(|instance| !moves[instance]);
     let mut found = Vec::new();
     // Instances with the same mesh and scale have the same charts; they mostly follow each other.
-    let mut last: Option<((u32, [u32; 9], bool), Arc<ChartSet>)> = None;
+    let mut last: Option<(InstanceKey, Arc<ChartSet>)> = None;
     for (done, set) in layout.sets().iter().enumerate() {
         let index = set.instance as usize;
         let (Some(instance), Some(posed)) = (scene.instances.get(index), pose.instances.get(index)) else {
@@ -49,15 +49,17 @@ pub fn find_cuts(
             continue;
         }
         let mesh = &scene.meshes[instance.mesh as usize];
-        let positions = scene.rest_positions(index);
-        let key = (instance.mesh, instance.rest_from_mesh.to_cols_array().map(f32::to_bits), moves[index]);
+        let defaults = ChartParams::for_spacing(layout.spacing_m(), moves[index]);
+        let key = InstanceKey {
+            mesh: instance.mesh,
+            rest_from_mesh: instance.rest_from_mesh,
+            texel_m: defaults.texel_m,
+        };
+        let positions = key.positions_rest(&mesh.positions);
         let charts = match &last {
             Some((of, charts)) if *of == key => charts.clone(),
             _ => {
-                let params = ChartParams {
-                    mirrored: instance.rest_from_mesh.determinant() < 0.0,
-                    ..ChartParams::for_spacing(layout.spacing_m(), moves[index])
-                };
+                let params = key.params(&defaults);
                 let Ok(charts) = ChartSet::new(&positions, &mesh.triangles, &params) else { continue };
                 Arc::new(charts)
             }

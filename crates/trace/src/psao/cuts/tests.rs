@@ -74,13 +74,12 @@ fn a_wall_cuts_exactly_what_lies_beyond_it() {
     let scene = scene(true, true);
     let (layout, cuts) = cuts(&scene);
     let set = &layout.sets()[0];
-    let charts = ChartSet::new(
-        &scene.rest_positions(0),
-        &scene.meshes[0].triangles,
-        &ChartParams::for_spacing(layout.spacing_m(), false),
-    )
-    .unwrap();
-    let sites = charts.sites(&scene.rest_positions(0), &scene.meshes[0].triangles);
+    let placed = &scene.instances[0];
+    let positions: Vec<Vec3> =
+        scene.meshes[0].positions.iter().map(|&p| placed.rest_from_mesh * p).collect();
+    let params = ChartParams::for_spacing(layout.spacing_m(), false);
+    let charts = ChartSet::new(&positions, &scene.meshes[0].triangles, &params).unwrap();
+    let sites = charts.sites(&positions, &scene.meshes[0].triangles);
     let own = cuts.for_sites(0, &sites).expect("made for these sites");
     assert!(own.cuts.len() > 20);
     let neighbours = PointNeighbours::new(&layout, set, &WeightParams::default());
