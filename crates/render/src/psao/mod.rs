@@ -13,9 +13,9 @@ use rayon::prelude::*;
 
 use crate::gbuffer::RestSurface;
 
+pub use dapple_store::charts::MovingLeastSquares;
 pub use hat::Hat;
 pub use index::PointIndex;
-pub use dapple_store::charts::MovingLeastSquares;
 
 /// How values of points near a fragment become its visibility.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +52,9 @@ pub fn reconstruct(
             chunk.iter().map(move |fragment| match (fragment, kernel) {
                 (None, _) => 1.0,
                 (Some(f), Kernel::Hat(hat)) => hat.visibility(index, visibility, f, &mut near),
-                (Some(f), Kernel::MovingLeastSquares(kernel)) => mls::visibility(kernel, index, visibility, f, &mut near),
+                (Some(f), Kernel::MovingLeastSquares(kernel)) => {
+                    mls::visibility(kernel, index, visibility, f, &mut near)
+                }
             })
         })
         .collect()

@@ -29,5 +29,5 @@ pub use set::{
     ChartError, ChartParams, ChartSet, ChartUv, ChartVertices, MOST_TEXELS, PageSize, Site, TEXEL_FRACTION,
 };
 pub use weights::{
-    Candidate, MAX_CANDIDATES, MAX_WEIGHTS, PointNeighbours, TexelWeights, WEIGHT_SUM, WeightParams, Weigher,
+    Candidate, MAX_CANDIDATES, MAX_WEIGHTS, PointNeighbours, TexelWeights, WEIGHT_SUM, Weigher, WeightParams,
 };

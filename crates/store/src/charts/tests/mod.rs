@@ -4,4 +4,5 @@ mod invariants;
 mod property;
 mod scenes;
 mod shapes;
+mod timing;
 mod truth;
