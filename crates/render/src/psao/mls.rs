@@ -59,7 +59,7 @@ impl MovingLeastSquares {
     }
 
     /// Weight of a point at `d` (in radii) from the fragment: (1 − |d|²)² · (n·nₚ)^power · plane factor.
-    fn weight(&self, d: Vec3, normal: Vec3, point_normal: Vec3) -> f32 {
+    pub(super) fn weight(&self, d: Vec3, normal: Vec3, point_normal: Vec3) -> f32 {
         let inside = 1.0 - d.length_squared();
         let mut cosine = normal.dot(point_normal);
         if inside <= 0.0 || cosine <= 0.0 {
@@ -76,7 +76,7 @@ impl MovingLeastSquares {
 
 /// Weighted normal equations of value ≈ a + b·u + c·v.
 #[derive(Debug, Default)]
-struct Fit {
+pub(super) struct Fit {
     w: f32,
     u: f32,
     v: f32,
@@ -91,7 +91,7 @@ struct Fit {
 }
 
 impl Fit {
-    fn add(&mut self, w: f32, u: f32, v: f32, y: f32) {
+    pub(super) fn add(&mut self, w: f32, u: f32, v: f32, y: f32) {
         if self.w == 0.0 {
             (self.least, self.greatest) = (y, y);
         }
@@ -109,7 +109,7 @@ impl Fit {
     }
 
     /// a, kept within the range of the values that were fitted: one-sided neighbourhoods must not overshoot.
-    fn value_at_origin(&self) -> Option<f32> {
+    pub(super) fn value_at_origin(&self) -> Option<f32> {
         if self.w.is_nan() || self.w < LEAST_WEIGHT {
             return None;
         }

@@ -2,9 +2,12 @@
 //!
 //! Takes the store's points and fragments in rest space; returns one visibility a fragment. See `README.md`.
 
+pub mod cells;
 mod hat;
+pub mod hash;
 mod index;
 mod mls;
+mod tables;
 #[cfg(test)]
 mod tests;
 
@@ -15,6 +18,9 @@ use crate::gbuffer::RestSurface;
 pub use hat::Hat;
 pub use index::PointIndex;
 pub use mls::MovingLeastSquares;
+#[cfg(feature = "gpu")]
+pub use tables::TableTextures;
+pub use tables::{TABLE_WIDTH, TableError};
 
 /// How values of points near a fragment become its visibility.
 #[derive(Clone, Copy, Debug, PartialEq)]
