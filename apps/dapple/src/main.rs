@@ -42,6 +42,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     let threads = match &cli.command {
         Command::Eval(args) => args.threads,
         Command::Render(args) => args.threads,
+        Command::Quality(args) => args.threads,
         Command::Scene(_) => 0,
     };
     if threads > 1024 {
@@ -51,6 +52,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     pool.install(|| match cli.command {
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
+        Command::Quality(args) => eval::quality::run(&args),
         Command::Scene(args) => scene_command::run(&args),
     })
 }

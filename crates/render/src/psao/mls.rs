@@ -76,7 +76,7 @@ impl MovingLeastSquares {
 
 /// Weighted normal equations of value ≈ a + b·u + c·v.
 #[derive(Debug, Default)]
-pub(super) struct Fit {
+struct Fit {
     w: f32,
     u: f32,
     v: f32,
@@ -91,7 +91,7 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    pub(super) fn add(&mut self, w: f32, u: f32, v: f32, y: f32) {
+    fn add(&mut self, w: f32, u: f32, v: f32, y: f32) {
         if self.w == 0.0 {
             (self.least, self.greatest) = (y, y);
         }
@@ -109,7 +109,7 @@ impl Fit {
     }
 
     /// a, kept within the range of the values that were fitted: one-sided neighbourhoods must not overshoot.
-    pub(super) fn value_at_origin(&self) -> Option<f32> {
+    fn value_at_origin(&self) -> Option<f32> {
         if self.w.is_nan() || self.w < LEAST_WEIGHT {
             return None;
         }

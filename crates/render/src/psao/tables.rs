@@ -191,7 +191,7 @@ mod gpu {
     impl TableTextures {
         pub(in crate::psao) fn new(device: &wgpu::Device, tables: &Tables) -> Result<TableTextures, TableError> {
             let limit = device.limits().max_texture_dimension_2d;
-            let mut make = |texels: &Texels, label| {
+            let make = |texels: &Texels, label| {
                 let rows = texels.data.len().div_ceil(TABLE_WIDTH).max(1) as u32;
                 if rows > limit {
                     return Err(TableError::TextureTooLarge { rows, limit });

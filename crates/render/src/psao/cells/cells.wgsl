@@ -114,8 +114,8 @@ fn cells_visibility(instance: u32, position_rest: vec3f, normal_rest: vec3f) -> 
     var fit = CellsFit(vec4f(0.0), vec3f(0.0), vec2f(0.0), vec2f(255.0, 0.0), vec3f(1.0, 3.4e38, 255.0));
     for (var corner = 0; corner < 8; corner++) {
         let cell = base + vec3i(corner & 1, (corner >> 1u) & 1, corner >> 2u);
-        let from = vec3f(cell) - position;
-        let outside = max(max(from, -from - 1.0), vec3f(0.0));
+        let lead = vec3f(cell) - position;
+        let outside = max(max(lead, -lead - 1.0), vec3f(0.0));
         if any(cell < vec3i(0)) || any(cell >= vec3i(dims.xyz)) || dot(outside, outside) >= 0.25 {
             continue;
         }

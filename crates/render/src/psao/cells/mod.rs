@@ -3,6 +3,9 @@
 //! Takes a layout, its values and a [`MovingLeastSquares`]; returns tables for [`PointCells::visibility`] and for
 //! `cells.wgsl`, which agree. See `README.md`.
 
+mod fit;
+#[cfg(test)]
+mod tests;
 mod twin;
 
 use dapple_store::points::{Change, PointLayout};

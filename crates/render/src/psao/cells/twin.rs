@@ -4,9 +4,9 @@ use dapple_store::points::PackedNormal;
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::fit::Fit;
 use super::{PointCells, hash};
 use crate::gbuffer::RestSurface;
-use crate::psao::mls::Fit;
 use crate::psao::tables::VirtualGrid;
 
 /// The point that serves where nothing has weight.
@@ -24,7 +24,7 @@ impl PointCells {
         let Some(grid) = self.grids.get(fragment.instance as usize).filter(|g| g.count > 0) else { return 1.0 };
         let position = grid.position_cells(fragment.position_rest, self.edge_m);
         let (tangent, bitangent) = fragment.normal_rest.any_orthonormal_pair();
-        let mut fit = Fit::default();
+        let mut fit = Fit::new();
         let mut nearest = Nearest { opposed: true, distance_squared: f32::MAX, visibility: 255.0 };
         for cell in grid.nearest_cells(position) {
             if !reaches(position, cell) {

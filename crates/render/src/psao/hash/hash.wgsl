@@ -80,20 +80,20 @@ fn hash_visibility(instance: u32, position_rest: vec3f, normal_rest: vec3f) -> f
         if found == 0u {
             continue;
         }
-        let from = vec3f(cell) - position;
+        let lead = vec3f(cell) - position;
         let first = textureLoad(hash_cells, hash_at(2u * found - 2u), 0);
         for (var i = 0u; i < 4u; i++) {
             if first[i] == 0u {
                 break;
             }
-            sums = hash_add(sums, first[i], from, normal_rest, params);
+            sums = hash_add(sums, first[i], lead, normal_rest, params);
         }
         let last = textureLoad(hash_cells, hash_at(2u * found - 1u), 0);
         for (var i = 0u; i < 3u; i++) {
             if last[i] == 0u {
                 break;
             }
-            sums = hash_add(sums, last[i], from, normal_rest, params);
+            sums = hash_add(sums, last[i], lead, normal_rest, params);
         }
     }
     // [Neff2023] eq. 4: open where nothing has weight.

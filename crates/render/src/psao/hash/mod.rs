@@ -4,6 +4,8 @@
 //! agree. See `README.md`.
 
 mod pack;
+#[cfg(test)]
+mod tests;
 mod twin;
 
 use dapple_store::points::{Change, PointLayout};
