@@ -4,16 +4,19 @@ use std::fmt::Write;
 use std::sync::Arc;
 
 use anyhow::{Result, bail};
+use dapple_render::psao::atlas::{AtlasParams, VisibilityAtlas};
 use dapple_render::psao::hash::PointHash;
 use dapple_render::psao::{Hat, Kernel, PointIndex, reconstruct};
 use dapple_scene::Scene;
+use dapple_store::charts::Cuts;
 use dapple_store::points::PointStore;
 use dapple_trace::Tracer;
 use dapple_trace::psao::generate::{GenerateParams, generate_points};
 use dapple_trace::psao::update::{UpdateParams, Updater};
+use rayon::prelude::*;
 use serde::Serialize;
 
-use super::samples::{Errors, SampleParams, Samples};
+use super::samples::{Errors, Place, SampleParams, Samples};
 use super::thin::{Side, ThinScene};
 use crate::args::QualityArgs;
 use crate::picture::write_file;
@@ -218,7 +221,7 @@ impl Run<'_> {
             bar.message(&format!("visibility, N = {points_per_m2}"));
             let update = UpdateParams { rays: visibility.point_rays, radius_m, threshold: visibility.threshold };
             let updater = Updater::new(scene, &pose, &tracer, points, update, &|_| ())?;
-            let found = find(updater.store(), samples)?;
+            let found = find(scene, updater.store(), samples)?;
             take(points_per_m2, updater.store(), samples, found);
         }
         Ok(())
@@ -226,10 +229,17 @@ impl Run<'_> {
 }
 
 /// What each method makes of a store.
-fn find(store: &PointStore, samples: &Samples) -> Result<Vec<Found>> {
+fn find(scene: &Scene, store: &PointStore, samples: &Samples) -> Result<Vec<Found>> {
     let fragments = samples.fragments();
     let index = PointIndex::new(store.layout());
     let by_kernel = |kernel| reconstruct(&index, store.visibility(), &kernel, &fragments);
+    let by_atlas = |cuts: Option<&Cuts>| {
+        let mut atlas = VisibilityAtlas::new(store.layout().clone(), scene, cuts, AtlasParams::default());
+        while !atlas.work(scene, store.visibility(), usize::MAX).is_complete() {}
+        let look_up =
+            |p: &Place| atlas.visibility(p.rest.instance, p.triangle, p.barycentrics, 1.0);
+        samples.places.par_iter().map(look_up).collect::<Vec<f32>>()
+    };
     let paper = PointHash::new(store.layout(), store.visibility(), Hat::default())?;
     Ok(vec![
         Found {
@@ -239,6 +249,7 @@ fn find(store: &PointStore, samples: &Samples) -> Result<Vec<Found>> {
         },
         Found { method: "hat", visibility: by_kernel(Kernel::Hat(Hat::default())), discarded: None },
         Found { method: "mls", visibility: by_kernel(Kernel::default()), discarded: None },
+        Found { method: "atlas", visibility: by_atlas(None), discarded: None },
     ])
 }
 

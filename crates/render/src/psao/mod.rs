@@ -2,6 +2,7 @@
 //!
 //! Takes the store's points and fragments in rest space; returns one visibility a fragment. See `README.md`.
 
+pub mod atlas;
 pub mod cells;
 mod hat;
 pub mod hash;
@@ -17,7 +18,7 @@ use crate::gbuffer::RestSurface;
 
 pub use hat::Hat;
 pub use index::PointIndex;
-pub use mls::MovingLeastSquares;
+pub use dapple_store::charts::MovingLeastSquares;
 #[cfg(feature = "gpu")]
 pub use tables::TableTextures;
 pub use tables::{TABLE_WIDTH, TableError};
@@ -57,7 +58,7 @@ pub fn reconstruct(
             chunk.iter().map(move |fragment| match (fragment, kernel) {
                 (None, _) => 1.0,
                 (Some(f), Kernel::Hat(hat)) => hat.visibility(index, visibility, f, &mut near),
-                (Some(f), Kernel::MovingLeastSquares(mls)) => mls.visibility(index, visibility, f, &mut near),
+                (Some(f), Kernel::MovingLeastSquares(kernel)) => mls::visibility(kernel, index, visibility, f, &mut near),
             })
         })
         .collect()

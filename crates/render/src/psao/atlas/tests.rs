@@ -1,0 +1,1 @@
+//! Exactness and truth of the atlas.

@@ -1,0 +1,4 @@
+//! Tests of charts.
+
+mod shapes;
+mod truth;
