@@ -4,6 +4,21 @@
 //! charts of one instance; an *atlas* is where the pages of all instances are placed. A *site* is a texel with the place
 //! on the surface that it stands for.
 
+mod atlas;
+mod build;
+mod flatten;
+mod grow;
+mod pack;
+mod per_vertex;
+mod plan;
+mod raster;
 mod set;
+mod surface;
+#[cfg(test)]
+mod tests;
 
-pub use set::{ChartError, ChartParams, ChartSet, ChartUv, ChartVertices, PageSize, Site, TEXEL_FRACTION};
+pub use atlas::{Atlas, AtlasError, Placement};
+pub use plan::{InstanceKey, SceneCharts};
+pub use set::{
+    ChartError, ChartParams, ChartSet, ChartUv, ChartVertices, MOST_TEXELS, PageSize, Site, TEXEL_FRACTION,
+};

@@ -1,0 +1,7 @@
+//! Tests of charts.
+
+mod invariants;
+mod property;
+mod scenes;
+mod shapes;
+mod truth;
