@@ -5,7 +5,7 @@ export PATH := $(PATH):$(HOME)/.cargo/bin
 
 REPORT := $(CURDIR)/out/demo
 
-.PHONY: demo test check fmt
+.PHONY: demo test bench check fmt
 
 # The whole loop on the built-in scene and a report of it; then the page, served on this machine (not with CI set).
 demo:
@@ -19,6 +19,11 @@ demo:
 test:
 	@bash scripts/setup.sh test
 	cargo xtask ci
+
+# What looking visibility up costs on this machine's adapter: target/bench.json.
+bench:
+	@bash scripts/setup.sh
+	cargo bench --package dapple --bench lookup
 
 check:
 	cargo xtask check

@@ -94,7 +94,8 @@ pub(crate) fn record(take: &Take<'_>) -> Result<Taken> {
     let bar = Bar::new("points", 1000);
     let mut server = Server::new(scene.clone(), &config, &|progress| match progress {
         Progress::Laying(done, of) => bar.set((done * 400 / of.max(1)) as u64),
-        Progress::Tracing(done, of) => bar.set((400 + done * 600 / of.max(1)) as u64),
+        Progress::Tracing(done, of) => bar.set((400 + done * 500 / of.max(1)) as u64),
+        Progress::Cutting(done, of) => bar.set((900 + done * 100 / of.max(1)) as u64),
     })?;
     drop(bar);
     let mut frame_bytes = 0;

@@ -53,6 +53,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Eval(args) => args.threads,
         Command::Render(args) => args.threads,
         Command::Record(args) => args.threads,
+        Command::Quality(args) => args.threads,
         Command::Scene(_) | Command::Inspect(_) | Command::Demo(_) | Command::View(_) => 0,
     };
     if threads > 1024 {
@@ -62,6 +63,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     pool.install(|| match cli.command {
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
+        Command::Quality(args) => eval::quality::run(&args),
         Command::Scene(args) => scene_command::run(&args),
         Command::Record(args) => record::run(&args),
         Command::Inspect(args) => inspect::run(&args),

@@ -48,7 +48,7 @@ fn a_recording_holds_what_the_server_sent() {
     let scene = std::sync::Arc::new(scene);
     let mut config = common::config(200.0, 64);
     config.generate =
-        dapple_trace::psao::generate::GenerateParams { points_per_m2: 200.0, ..Default::default() };
+        dapple_trace::psao::generate::GenerateParams { points_per_m2: 200.0, seed: 1, ..Default::default() };
     let mut server = Server::new(scene.clone(), &config, &|_| ()).unwrap();
     let mut states = vec![server.store().clone()];
     for tick in 1..=20 {

@@ -5,6 +5,7 @@ use std::pin::pin;
 use std::task::{Context, Poll, Waker};
 
 use crate::Gpu;
+pub use naga;
 
 /// A device, or `None` after saying so. With `REQUIRE_GPU=1` in the environment a missing device is a failure.
 ///
@@ -45,6 +46,40 @@ pub fn validate(wgsl: &str) -> Result<naga::Module, String> {
         naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
     validator.validate(&module).map_err(|e| e.emit_to_string(wgsl))?;
     Ok(module)
+}
+
+/// Translates one entry point to the GLSL of WebGL2, with its overrides at their defaults: what WebGL2 cannot do is an
+/// error here.
+///
+/// # Errors
+/// What the language lacks.
+pub fn translate_to_webgl2(
+    module: &naga::Module,
+    stage: naga::ShaderStage,
+    entry_point: &str,
+) -> Result<String, String> {
+    let mut validator =
+        naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
+    let info = validator.validate(module).map_err(|e| e.to_string())?;
+    let constants = naga::back::PipelineConstants::default();
+    let entry = Some((stage, entry_point));
+    let (module, info) = naga::back::pipeline_constants::process_overrides(module, &info, entry, &constants)
+        .map_err(|e| e.to_string())?;
+    let options = naga::back::glsl::Options {
+        version: naga::back::glsl::Version::Embedded { version: 300, is_webgl: true },
+        ..Default::default()
+    };
+    let pipeline = naga::back::glsl::PipelineOptions {
+        shader_stage: stage,
+        entry_point: entry_point.into(),
+        multiview: None,
+    };
+    let mut text = String::new();
+    let bounds = naga::proc::BoundsCheckPolicies::default();
+    naga::back::glsl::Writer::new(&mut text, &module, &info, &options, &pipeline, bounds)
+        .and_then(|mut writer| writer.write())
+        .map_err(|e| e.to_string())?;
+    Ok(text)
 }
 
 /// Checks that a structure of a module is laid out like its Rust mirror: the same size, and each named member at the

@@ -150,6 +150,9 @@ impl Live {
             Reply::Progress(Progress::Tracing(done, of)) => {
                 self.start = Start::Doing("tracing points", part(done, of));
             }
+            Reply::Progress(Progress::Cutting(done, of)) => {
+                self.start = Start::Doing("cutting points", part(done, of));
+            }
             Reply::Frame(bytes) => {
                 self.start = Start::Done;
                 return Some(bytes);

@@ -59,13 +59,7 @@ impl Overlay {
     }
 
     /// Lays everything out.
-    pub(super) fn lay(
-        &mut self,
-        ui: &mut Ui,
-        show: &mut Show,
-        has_storage: bool,
-        now_s: f64,
-    ) -> Option<Wish> {
+    pub(super) fn lay(&mut self, ui: &mut Ui, show: &mut Show, now_s: f64) -> Option<Wish> {
         let ctx = ui.ctx().clone();
         let mut wish = None;
         if !self.hidden {
@@ -76,7 +70,7 @@ impl Overlay {
                 |ui| {
                     figures_grid(ui, show, &figures);
                     ui.separator();
-                    wish = choices(ui, show, has_storage);
+                    wish = choices(ui, show);
                     ui.horizontal(|ui| {
                         if ui.button("Screenshot").clicked() {
                             wish = Some(Wish::Screenshot);
@@ -128,7 +122,7 @@ fn figures_grid(ui: &mut Ui, show: &Show, figures: &Figures) {
     let viewer = &figures.viewer;
     let age = figures.age_s.map_or("–".to_owned(), |age_s| format!("{age_s:.1} s"));
     let texels = match figures.progress {
-        progress if progress.done < progress.total => {
+        progress if !progress.is_complete() => {
             format!("{:.0} %", 100.0 * progress.done as f64 / progress.total as f64)
         }
         _ => viewer.texels.to_string(),
@@ -155,13 +149,12 @@ fn figures_grid(ui: &mut Ui, show: &Show, figures: &Figures) {
     });
 }
 
-fn choices(ui: &mut Ui, show: &mut Show, has_storage: bool) -> Option<Wish> {
+fn choices(ui: &mut Ui, show: &mut Show) -> Option<Wish> {
     let mut wish = None;
-    let can = |method: Method| has_storage || method != Method::PsaoPaper;
     let pick_method = |ui: &mut Ui, label: &str, method: &mut Method| {
         egui::ComboBox::from_label(label).selected_text(name_of(&METHODS, *method)).show_ui(ui, |ui| {
             for (choice, name) in METHODS {
-                ui.add_enabled_ui(can(choice), |ui| ui.selectable_value(method, choice, name));
+                ui.selectable_value(method, choice, name);
             }
         });
     };

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use dapple_client::viewer::{DebugView, Method};
+use dapple_client::viewer::{DebugView, Method, ViewerError};
 use dapple_gpu::{GpuFault, wgpu};
 use dapple_scene::glam::Vec3;
 use winit::event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent};
@@ -133,11 +133,18 @@ impl Session {
         }
         let Some(canvas) = self.screen.next()? else { return Ok(()) };
         let size = self.screen.size();
-        self.show.draw(&self.screen.gpu, &canvas.view, size, now_s)?;
-        let has_storage = self.screen.gpu.has_storage_buffers();
-        let wish = self
-            .painter
-            .paint(&self.screen, &canvas.view, |ui| self.overlay.lay(ui, &mut self.show, has_storage, now_s));
+        if let Err(error) = self.show.draw(&self.screen.gpu, &canvas.view, size, now_s) {
+            return match error.downcast::<ViewerError>() {
+                Ok(ViewerError::Fault(fault)) => {
+                    drop(canvas);
+                    self.mend(event_loop, fault, now_s)
+                }
+                Ok(error) => Err(error.into()),
+                Err(error) => Err(error),
+            };
+        }
+        let wish =
+            self.painter.paint(&self.screen, &canvas.view, |ui| self.overlay.lay(ui, &mut self.show, now_s));
         self.screen.present(canvas);
         self.show.count_picture(now_s);
         self.drawn_s = now_s;
@@ -252,12 +259,7 @@ impl Session {
                 let (width, height) = self.screen.size();
                 show.steering.fit(&scene, time_s, width as f32 / height as f32);
             }
-            KeyCode::KeyM => {
-                show.options.method = next_of(&METHODS, show.options.method);
-                if show.options.method == Method::PsaoPaper && !self.screen.gpu.has_storage_buffers() {
-                    show.options.method = next_of(&METHODS, Method::PsaoPaper);
-                }
-            }
+            KeyCode::KeyM => show.options.method = next_of(&METHODS, show.options.method),
             KeyCode::KeyB => {
                 show.options.split = match show.options.split {
                     None => Some((0.5, Method::None)),

@@ -10,7 +10,7 @@ use dapple_gpu::{Gpu, wgpu};
 use dapple_render::shade::ShadeParams;
 use dapple_scene::Scene;
 use dapple_server::ServerConfig;
-use dapple_stream::{Limits, PublisherConfig};
+use dapple_stream::PublisherConfig;
 
 use super::feed::{Feed, group_of};
 use super::live::Live;
@@ -19,8 +19,8 @@ use super::steer::Steering;
 use crate::args::LightArgs;
 use crate::light::{scene_seconds, server_config};
 
-/// Texels that are worked on at a time.
-const WORK_TEXELS: usize = 4096;
+/// Texels that are worked on at a time: some milliseconds.
+const WORK_TEXELS: usize = 512;
 
 /// Seconds of a frame that may go into work after a snapshot.
 const WORK_S: f64 = 0.008;
@@ -142,7 +142,7 @@ impl Show {
             let progress = self.viewer.work(WORK_TEXELS);
             changed |= progress != self.progress;
             self.progress = progress;
-            if progress.done >= progress.total {
+            if progress.is_complete() {
                 break;
             }
         }
@@ -164,7 +164,7 @@ impl Show {
     pub(super) fn finish_work(&mut self) {
         loop {
             self.progress = self.viewer.work(WORK_TEXELS);
-            if self.progress.done >= self.progress.total {
+            if self.progress.is_complete() {
                 return;
             }
         }
@@ -215,5 +215,5 @@ pub(super) fn start_server(scene: &Arc<Scene>, light: &LightArgs, first_group: u
 
 fn viewer_config(quality: &Quality, format: wgpu::TextureFormat) -> ViewerConfig {
     let shade = ShadeParams { shadow_resolution: quality.shadow_resolution, ..ShadeParams::default() };
-    ViewerConfig { format, samples: quality.samples, shade, limits: Limits::default() }
+    ViewerConfig { samples: quality.samples, shade, ..ViewerConfig::new(format) }
 }
