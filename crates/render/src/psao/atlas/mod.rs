@@ -20,9 +20,10 @@ use dapple_store::points::PointLayout;
 
 pub use dapple_store::charts::Placement;
 pub use pages::DirtyBand;
+pub use upload::TexelInfo;
+
 use pages::{Pages, PlacedPages};
 use resolve::{Builder, PointTexels, Sums, add_values};
-pub use upload::TexelInfo;
 
 /// How an atlas is made. Cuts fit only the default texel sizes and kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
