@@ -72,7 +72,8 @@ pub(crate) fn measure(scene: &Scene, store: &Arc<PointStore>, rounds: usize) -> 
     let (scattered_ms, clustered_ms) = (update(&scattered), update(&clustered));
     let atlas_bytes = atlas.memory_bytes() as f64 / points as f64;
     let start = Instant::now();
-    let paper = PointHash::new(store.layout(), store.visibility(), Hat::default()).expect("the tables are made");
+    let paper =
+        PointHash::new(store.layout(), store.visibility(), Hat::default()).expect("the tables are made");
     let paper_s = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let direct = PointCells::new(store.layout(), store.visibility(), MovingLeastSquares::default())
@@ -81,10 +82,17 @@ pub(crate) fn measure(scene: &Scene, store: &Arc<PointStore>, rounds: usize) -> 
     let a_point = |(shown, kept): (u64, u64)| (shown + kept) as f64 / points as f64;
     println!("\nprocessor, {points} points");
     println!("  atlas, load (charts, weights, sums): {load_all_s:.2} s, on one thread {load_one_s:.2} s");
-    println!("  atlas, update of {count} points: scattered {:.3} ms, clustered {:.3} ms", scattered_ms.1, clustered_ms.1);
+    println!(
+        "  atlas, update of {count} points: scattered {:.3} ms, clustered {:.3} ms",
+        scattered_ms.1, clustered_ms.1
+    );
     println!("    of which to begin it: {:.3} ms, {:.3} ms", scattered_ms.0, clustered_ms.0);
     println!("  atlas, memory: {atlas_bytes:.1} bytes a point, and {STORE_BYTES} of the store");
-    println!("  paper: made in {paper_s:.2} s, {:.1} bytes a point, {:?}", a_point(paper.bytes()), paper.overflow());
+    println!(
+        "  paper: made in {paper_s:.2} s, {:.1} bytes a point, {:?}",
+        a_point(paper.bytes()),
+        paper.overflow()
+    );
     println!("  direct: made in {direct_s:.2} s, {:.1} bytes a point", a_point(direct.bytes()));
     json!({
         "points": points,

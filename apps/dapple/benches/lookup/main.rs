@@ -71,7 +71,11 @@ fn main() -> Result<()> {
         (width, height) = (640, 360);
     }
     let seen = View::new(arguments.detail, width, height);
-    println!("atrium, {} triangles, {width}x{height}, {} rounds", seen.scene.triangle_count(), arguments.rounds);
+    println!(
+        "atrium, {} triangles, {width}x{height}, {} rounds",
+        seen.scene.triangle_count(),
+        arguments.rounds
+    );
 
     let (mut costs, mut processor) = (Vec::new(), Value::Null);
     for &wanted in &arguments.points {
@@ -231,7 +235,13 @@ fn summary(points: usize, load_s: f64, candidates: &[Candidate], took: &[Vec<Too
         let is_added = i > 0 && i < candidates.len();
         let of_wall = is_added.then(|| ratio(i, &|t| Some(t.wall_ms))).flatten();
         let of_cpu = is_added.then(|| ratio(i, &|t| t.cpu_ms)).flatten();
-        println!("  {name:<14}{:>10.2}{:>10}{:>14}{:>14}", wall(i), number(cpu(i)), number(of_wall), number(of_cpu));
+        println!(
+            "  {name:<14}{:>10.2}{:>10}{:>14}{:>14}",
+            wall(i),
+            number(cpu(i)),
+            number(of_wall),
+            number(of_cpu)
+        );
         rows.push(json!({
             "name": name, "wall_ms": wall(i), "cpu_ms": cpu(i), "of_ssao_wall": of_wall, "of_ssao_cpu": of_cpu,
         }));

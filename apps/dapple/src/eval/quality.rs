@@ -45,8 +45,9 @@ struct SurfaceRow {
     points: u64,
     method: &'static str,
     all: Class,
-    #[serde(rename = "static")]
-    still: Class,
+    /// What stands still, seen from the front, and from the back of double-sided surfaces.
+    static_front: Class,
+    static_back: Class,
     movers: Class,
     /// Points that the paper's cells and buckets had no room for.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -152,7 +153,8 @@ impl Run<'_> {
                     points: store.layout().len() as u64,
                     method,
                     all: class(&|_| true),
-                    still: class(&|i| !samples.moving[i]),
+                    static_front: class(&|i| !samples.moving[i] && !samples.places[i].back),
+                    static_back: class(&|i| !samples.moving[i] && samples.places[i].back),
                     movers: class(&|i| samples.moving[i]),
                     discarded,
                 });
@@ -219,7 +221,8 @@ impl Run<'_> {
             }
             let Some(samples) = &samples else { continue };
             bar.message(&format!("visibility, N = {points_per_m2}"));
-            let update = UpdateParams { rays: visibility.point_rays, radius_m, threshold: visibility.threshold };
+            let update =
+                UpdateParams { rays: visibility.point_rays, radius_m, threshold: visibility.threshold };
             let updater = Updater::new(scene, &pose, &tracer, points, update, &|_| ())?;
             let found = find(scene, updater.store(), samples)?;
             take(points_per_m2, updater.store(), samples, found);
@@ -236,8 +239,7 @@ fn find(scene: &Scene, store: &PointStore, samples: &Samples) -> Result<Vec<Foun
     let by_atlas = |cuts: Option<&Cuts>| {
         let mut atlas = VisibilityAtlas::new(store.layout().clone(), scene, cuts, AtlasParams::default());
         while !atlas.work(scene, store.visibility(), usize::MAX).is_complete() {}
-        let look_up =
-            |p: &Place| atlas.visibility(p.rest.instance, p.triangle, p.barycentrics, 1.0);
+        let look_up = |p: &Place| atlas.visibility(p.rest.instance, p.triangle, p.barycentrics, 1.0);
         samples.places.par_iter().map(look_up).collect::<Vec<f32>>()
     };
     let paper = PointHash::new(store.layout(), store.visibility(), Hat::default())?;
@@ -261,15 +263,20 @@ fn db(value: Option<f64>) -> String {
 fn surface_table(rows: &[SurfaceRow]) -> String {
     let mut text = String::new();
     if let Some(row) = rows.first() {
-        let (all, movers) = (row.all.places, row.movers.places);
-        let _ = writeln!(text, "{}: {all} places on surfaces, {movers} on movers\n", row.scene);
+        let (all, backs, movers) = (row.all.places, row.static_back.places, row.movers.places);
+        let _ =
+            writeln!(text, "{}: {all} places on surfaces, {backs} on backs, {movers} on movers\n", row.scene);
     }
-    text.push_str("| N | points | method | all dB | static dB | movers dB | points discarded |\n|---|---|---|---|---|---|---|\n");
+    text.push_str("| N | points | method | all dB | static dB | static, backs dB | movers dB | points discarded |\n|---|---|---|---|---|---|---|---|\n");
     for row in rows {
         let SurfaceRow { points_per_m2, points, method, .. } = row;
-        let [all, still, movers] = [&row.all, &row.still, &row.movers].map(|c| db(c.psnr_db));
+        let [all, front, back, movers] =
+            [&row.all, &row.static_front, &row.static_back, &row.movers].map(|c| db(c.psnr_db));
         let discarded = row.discarded.map_or_else(|| "–".to_owned(), |d| d.to_string());
-        let _ = writeln!(text, "| {points_per_m2} | {points} | {method} | {all} | {still} | {movers} | {discarded} |");
+        let _ = writeln!(
+            text,
+            "| {points_per_m2} | {points} | {method} | {all} | {front} | {back} | {movers} | {discarded} |"
+        );
     }
     text
 }

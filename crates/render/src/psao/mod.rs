@@ -4,8 +4,8 @@
 
 pub mod atlas;
 pub mod cells;
-mod hat;
 pub mod hash;
+mod hat;
 mod index;
 mod mls;
 mod tables;
@@ -16,9 +16,9 @@ use rayon::prelude::*;
 
 use crate::gbuffer::RestSurface;
 
+pub use dapple_store::charts::MovingLeastSquares;
 pub use hat::Hat;
 pub use index::PointIndex;
-pub use dapple_store::charts::MovingLeastSquares;
 #[cfg(feature = "gpu")]
 pub use tables::TableTextures;
 pub use tables::{TABLE_WIDTH, TableError};
@@ -58,7 +58,9 @@ pub fn reconstruct(
             chunk.iter().map(move |fragment| match (fragment, kernel) {
                 (None, _) => 1.0,
                 (Some(f), Kernel::Hat(hat)) => hat.visibility(index, visibility, f, &mut near),
-                (Some(f), Kernel::MovingLeastSquares(kernel)) => mls::visibility(kernel, index, visibility, f, &mut near),
+                (Some(f), Kernel::MovingLeastSquares(kernel)) => {
+                    mls::visibility(kernel, index, visibility, f, &mut near)
+                }
             })
         })
         .collect()

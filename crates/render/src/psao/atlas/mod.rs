@@ -19,8 +19,8 @@ use glam::Vec3;
 
 pub use pages::{DirtyBand, Placement};
 use pages::{Pages, PlacedPages};
-pub use upload::TexelInfo;
 use resolve::{Builder, PointTexels, Sums, add_values};
+pub use upload::TexelInfo;
 
 /// How an atlas is made. Cuts fit only the default texel sizes and kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,7 +117,11 @@ enum Stage {
     Weigh(Box<Builder>),
     Encode(Box<Builder>),
     /// Points before `next` are in the sums.
-    Sum { table: PointTexels, sums: Sums, next: usize },
+    Sum {
+        table: PointTexels,
+        sums: Sums,
+        next: usize,
+    },
 }
 
 /// Texels of work that other steps are worth, in parts of a weighed texel.
@@ -338,7 +342,9 @@ impl VisibilityAtlas {
         let mut at = 0;
         for PointChange { point, old, new } in changes {
             let difference = i32::from(new) - i32::from(old);
-            let in_set = |at: usize| sets.get(at).is_some_and(|s| s.first <= point && point - s.first < s.len() as u32);
+            let in_set = |at: usize| {
+                sets.get(at).is_some_and(|s| s.first <= point && point - s.first < s.len() as u32)
+            };
             if !in_set(at) {
                 // Empty sets share their first point with the one after them, which is the last of those.
                 at = sets.partition_point(|s| s.first <= point).saturating_sub(1);

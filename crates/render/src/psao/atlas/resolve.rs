@@ -165,10 +165,7 @@ impl Builder {
             .par_iter()
             .enumerate()
             .with_min_len(256)
-            .map_init(
-                || neighbours.weigher(set),
-                |weigher, (i, site)| weigher.weigh(site, cut(first + i)),
-            )
+            .map_init(|| neighbours.weigher(set), |weigher, (i, site)| weigher.weigh(site, cut(first + i)))
             .collect();
         for (site, weights) in piece.iter().zip(&weights) {
             self.counts.push(weights.len() as u8);

@@ -102,7 +102,8 @@ impl VisibilityAtlas {
                     continue;
                 };
                 for row in 0..u32::from(height) {
-                    let start = ((place.y + u32::from(y) + row) * self.side() + place.x + u32::from(x)) as usize;
+                    let start =
+                        ((place.y + u32::from(y) + row) * self.side() + place.x + u32::from(x)) as usize;
                     for info in &mut infos[start..start + usize::from(width)] {
                         info.chart = chart + 1;
                     }
