@@ -251,7 +251,10 @@ pub(crate) enum View {
 /// A method as `eval` names it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Method {
+    /// Through the visibility atlas.
     Psao,
+    /// Least squares at every sample.
+    PsaoMls,
     /// With the radius in units of the spacing.
     PsaoHat {
         radius: f32,
@@ -265,7 +268,7 @@ pub(crate) enum Method {
 impl Method {
     /// Whether it depends on points and server rate.
     pub(crate) fn uses_points(self) -> bool {
-        matches!(self, Method::Psao | Method::PsaoHat { .. })
+        matches!(self, Method::Psao | Method::PsaoMls | Method::PsaoHat { .. })
     }
 }
 
@@ -273,6 +276,7 @@ impl std::fmt::Display for Method {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Method::Psao => write!(f, "psao"),
+            Method::PsaoMls => write!(f, "psao-mls"),
             Method::PsaoHat { radius: 1.0 } => write!(f, "psao-hat"),
             Method::PsaoHat { radius } => write!(f, "psao-hat-{radius}"),
             Method::Rtao { rays } => write!(f, "rtao-{rays}"),
@@ -287,6 +291,7 @@ impl FromStr for Method {
     fn from_str(s: &str) -> Result<Self, Self::Err> {
         match s {
             "psao" => Ok(Method::Psao),
+            "psao-mls" => Ok(Method::PsaoMls),
             "psao-hat" => Ok(Method::PsaoHat { radius: 1.0 }),
             "none" => Ok(Method::None),
             "rtao" => Ok(Method::Rtao { rays: 16 }),
@@ -297,7 +302,7 @@ impl FromStr for Method {
                     (Some(rays @ 1..=65536), _) => Ok(Method::Rtao { rays }),
                     (_, Some(radius)) if (0.1..=8.0).contains(&radius) => Ok(Method::PsaoHat { radius }),
                     _ => Err(
-                        "known methods: psao, psao-hat, psao-hat-F with its radius times F from 0.1 to 8, \
+                        "known methods: psao, psao-mls, psao-hat, psao-hat-F with its radius times F from 0.1 to 8, \
                               rtao-R with R from 1 to 65536 (rtao-16), none"
                             .into(),
                     ),

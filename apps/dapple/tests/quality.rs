@@ -34,7 +34,7 @@ fn leaks_under_thin_walls_stay_within_bounds() {
     ]);
     let leaks = &found["leaks"];
     for scene in ["thin wall", "shelves"] {
-        for method in ["paper", "hat", "mls", "atlas"] {
+        for method in ["paper", "hat", "mls", "atlas-uncut", "atlas"] {
             let row = row(leaks, Some(scene), method);
             assert!(row["places"].as_u64().unwrap() > 50, "{row}");
             // The dark side can only gain light, the open side only lose it, up to noise.

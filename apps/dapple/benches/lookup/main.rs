@@ -151,7 +151,7 @@ fn lay_points(seen: &View, wanted: u32) -> Result<PointStore> {
 /// Times every candidate on one store.
 fn compare(gpu: &Gpu, seen: &View, store: &PointStore, rounds: usize, repeat: u32) -> Result<Value> {
     let points = store.layout().len();
-    let (atlas, load_s) = cpu::load_atlas(&seen.scene, store);
+    let (atlas, load) = cpu::load_atlas(&seen.scene, store);
     let frame = Fragments::new(gpu.clone(), seen.gbuffer.width, &seen.fragments, &seen.charts(&atlas));
     let mut paper = PointHash::new(store.layout(), store.visibility(), Hat::default())?;
     let mut direct = PointCells::new(store.layout(), store.visibility(), MovingLeastSquares::default())?;
@@ -189,7 +189,7 @@ fn compare(gpu: &Gpu, seen: &View, store: &PointStore, rounds: usize, repeat: u3
     if let Some(fault) = gpu.take_fault() {
         bail!("{fault}");
     }
-    Ok(summary(points, load_s, &candidates, &took, f64::from(repeat)))
+    Ok(summary(points, load.wall_ms * 1e-3, &candidates, &took, f64::from(repeat)))
 }
 
 /// Every candidate must show what its twin gives: who measures nothing is fast.

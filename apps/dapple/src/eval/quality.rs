@@ -11,6 +11,7 @@ use dapple_scene::Scene;
 use dapple_store::charts::Cuts;
 use dapple_store::points::PointStore;
 use dapple_trace::Tracer;
+use dapple_trace::psao::cuts::find_cuts;
 use dapple_trace::psao::generate::{GenerateParams, generate_points};
 use dapple_trace::psao::update::{UpdateParams, Updater};
 use rayon::prelude::*;
@@ -224,7 +225,9 @@ impl Run<'_> {
             let update =
                 UpdateParams { rays: visibility.point_rays, radius_m, threshold: visibility.threshold };
             let updater = Updater::new(scene, &pose, &tracer, points, update, &|_| ())?;
-            let found = find(scene, updater.store(), samples)?;
+            bar.message(&format!("cuts, N = {points_per_m2}"));
+            let cuts = find_cuts(scene, &rest_pose, &rest_tracer, updater.store().layout(), &|_| ());
+            let found = find(scene, updater.store(), &cuts, samples)?;
             take(points_per_m2, updater.store(), samples, found);
         }
         Ok(())
@@ -232,7 +235,7 @@ impl Run<'_> {
 }
 
 /// What each method makes of a store.
-fn find(scene: &Scene, store: &PointStore, samples: &Samples) -> Result<Vec<Found>> {
+fn find(scene: &Scene, store: &PointStore, cuts: &Cuts, samples: &Samples) -> Result<Vec<Found>> {
     let fragments = samples.fragments();
     let index = PointIndex::new(store.layout());
     let by_kernel = |kernel| reconstruct(&index, store.visibility(), &kernel, &fragments);
@@ -251,7 +254,8 @@ fn find(scene: &Scene, store: &PointStore, samples: &Samples) -> Result<Vec<Foun
         },
         Found { method: "hat", visibility: by_kernel(Kernel::Hat(Hat::default())), discarded: None },
         Found { method: "mls", visibility: by_kernel(Kernel::default()), discarded: None },
-        Found { method: "atlas", visibility: by_atlas(None), discarded: None },
+        Found { method: "atlas-uncut", visibility: by_atlas(None), discarded: None },
+        Found { method: "atlas", visibility: by_atlas(Some(cuts)), discarded: None },
     ])
 }
 

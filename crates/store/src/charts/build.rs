@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::flatten::{Flat, flatten};
+use super::flatten::Flat;
 use super::grow::{GrowParams, grow_all};
 use super::pack::{Packed, pack};
 use super::per_vertex::vertex_pages;
@@ -105,10 +105,10 @@ struct Flattened {
 impl Flattened {
     fn new(surface: &Surface, params: GrowParams) -> Flattened {
         let grown = grow_all(surface, params);
-        let mut charts: Vec<Flat> = grown.iter().map(|c| flatten(surface, c, params.max_side)).collect();
+        let mut charts: Vec<Flat> = grown.iter().map(|c| c.1).collect();
         let count = surface.corners.len();
         let mut chart_of = vec![NONE; count];
-        for (chart, grown) in grown.iter().enumerate() {
+        for (chart, (grown, _)) in grown.iter().enumerate() {
             for &t in &grown.triangles {
                 chart_of[t as usize] = chart as u32;
             }

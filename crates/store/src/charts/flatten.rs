@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::grow::{Frame, Grown};
+use super::set::TEXEL_FRACTION;
 use super::surface::Surface;
 
 /// A side shorter than this, in texels, gets one texel.
@@ -39,6 +40,14 @@ impl Flat {
         p.clamp(DVec2::ZERO, last)
     }
 
+    /// The same in steps of 1 / [`TEXEL_FRACTION`] texel, from the border of the first texel: what a [`ChartUv`] counts.
+    ///
+    /// [`ChartUv`]: super::ChartUv
+    pub(super) fn snapped_texel_of(&self, place: DVec3) -> [u16; 2] {
+        let at = (self.texel_of(place) + 0.5) * f64::from(TEXEL_FRACTION);
+        [at.x.round() as u16, at.y.round() as u16]
+    }
+
     /// The place over a texel on the plane through `corner` with normal `normal` (which faces the chart).
     pub(super) fn place_over(&self, texel: [u16; 2], corner: DVec3, normal: DVec3) -> DVec3 {
         let [u_axis, v_axis, n_axis] = self.frame.axes;
@@ -59,6 +68,7 @@ pub(super) fn flatten(surface: &Surface, chart: &Grown, max_side: u16) -> Flat {
         .flat_map(|&t| surface.corner_places(t as usize))
         .map(|p| chart.frame.project(p).truncate())
         .collect();
+    drop_inner(&mut outline);
     convex_hull(&mut outline);
     let mut best: Option<(u32, f64, Flat)> = None;
     for direction in directions(&outline) {
@@ -134,8 +144,38 @@ fn directions(outline: &[DVec2]) -> Vec<DVec2> {
     std::iter::once(DVec2::X).chain(units).collect()
 }
 
+/// Drops what lies inside the octagon of the outermost points: sorting few is faster than sorting all.
+fn drop_inner(points: &mut Vec<DVec2>) {
+    if points.len() < 64 {
+        return;
+    }
+    let slants = [
+        (1.0, 0.0),
+        (1.0, 1.0),
+        (0.0, 1.0),
+        (-1.0, 1.0),
+        (-1.0, 0.0),
+        (-1.0, -1.0),
+        (0.0, -1.0),
+        (1.0, -1.0),
+    ]
+    .map(|(x, y)| DVec2::new(x, y));
+    let mut octagon = [points[0]; 8];
+    for &p in points.iter() {
+        for (corner, slant) in octagon.iter_mut().zip(slants) {
+            if p.dot(slant) > corner.dot(slant) {
+                *corner = p;
+            }
+        }
+    }
+    let edges: [(DVec2, DVec2); 8] = std::array::from_fn(|i| (octagon[i], octagon[(i + 1) % 8] - octagon[i]));
+    points.retain(|&p| edges.iter().any(|&(a, edge)| edge != DVec2::ZERO && edge.perp_dot(p - a) <= 0.0));
+}
+
 /// Keeps the corners of the convex hull, counter-clockwise.
 fn convex_hull(points: &mut Vec<DVec2>) {
+    // Adding zero makes -0 the same as +0 for the order, too.
+    points.iter_mut().for_each(|p| *p += DVec2::ZERO);
     points.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     points.dedup();
     if points.len() < 3 {

@@ -2,11 +2,19 @@
 
 use glam::{DVec2, DVec3};
 
+use super::flatten::{Flat, flatten};
 use super::raster::touched;
+use super::set::TEXEL_FRACTION;
 use super::surface::{NONE, Surface};
 
 /// How far, in texels, two places over one texel may be apart along the normal beyond what the cone allows.
 const HEIGHT_TOLERANCE: f64 = 0.25;
+
+/// How far apart, in texels, the planes of the triangles over one texel may pass its centre.
+const MOST_RANGE: f64 = 2.0;
+
+/// Triangles dropped from charts for each of the mesh; beyond, charts may keep what lies over each other.
+const MOST_DROPPED: usize = 8;
 
 /// A mean normal closer to the seed's than this (1.8°) is not worth growing again for.
 const SAME_AXIS: f64 = 0.9995;
@@ -64,7 +72,7 @@ pub(super) struct Grown {
 
 /// Cuts the whole surface into charts, in order of their seeds: largest triangle first. Triangles without area and
 /// repeated ones are left out.
-pub(super) fn grow_all(surface: &Surface, params: GrowParams) -> Vec<Grown> {
+pub(super) fn grow_all(surface: &Surface, params: GrowParams) -> Vec<(Grown, Flat)> {
     let mut seeds: Vec<u32> = (0..surface.corners.len() as u32)
         .filter(|&t| !surface.is_degenerate(t as usize) && surface.repeats[t as usize] == NONE)
         .collect();
@@ -78,12 +86,15 @@ pub(super) fn grow_all(surface: &Surface, params: GrowParams) -> Vec<Grown> {
         seen: vec![0; surface.corners.len()],
         stamp: 0,
         cells: Cells::new(),
+        dropped: 0,
+        most_dropped: MOST_DROPPED * surface.corners.len(),
     };
     let mut charts = Vec::new();
     for seed in seeds {
         if !grower.taken[seed as usize] {
             let chart = grower.grow_best(seed);
-            for &t in &chart.triangles {
+            let chart = grower.settle(chart);
+            for &t in &chart.0.triangles {
                 grower.taken[t as usize] = true;
             }
             charts.push(chart);
@@ -102,6 +113,9 @@ struct Grower<'s> {
     seen: Vec<u32>,
     stamp: u32,
     cells: Cells,
+    /// Triangles dropped from charts so far, and when to stop, which bounds the time taken.
+    dropped: usize,
+    most_dropped: usize,
 }
 
 impl Grower<'_> {
@@ -124,7 +138,8 @@ impl Grower<'_> {
     fn grow(&mut self, seed: u32, normal: DVec3) -> Grown {
         let surface = self.surface;
         let frame = Frame::with_normal(surface.corner_places(seed as usize)[0], normal);
-        let [mut low, mut high] = bounds(frame, surface.corner_places(seed as usize));
+        let corners = surface.corner_places(seed as usize).map(|p| frame.project(p));
+        let [mut low, mut high] = bounds(corners);
         let steps = f64::from(self.params.max_side - 1);
         let texel = self.params.texel.max((high - low).max_element() / steps);
         let longest = texel * steps;
@@ -132,7 +147,7 @@ impl Grower<'_> {
         self.cells.clear();
         let mut triangles = vec![seed];
         self.seen[seed as usize] = self.stamp;
-        self.claim(seed, frame, texel);
+        self.claim_in(seed, corners, &frame, texel);
         let mut next = 0;
         while next < triangles.len() {
             for neighbour in surface.neighbours[triangles[next] as usize] {
@@ -144,9 +159,12 @@ impl Grower<'_> {
                 if surface.normals[n].dot(normal) < self.params.least_cosine {
                     continue;
                 }
-                let [own_low, own_high] = bounds(frame, surface.corner_places(n));
+                let corners = surface.corner_places(n).map(|p| frame.project(p));
+                let [own_low, own_high] = bounds(corners);
                 let (new_low, new_high) = (low.min(own_low), high.max(own_high));
-                if (new_high - new_low).max_element() > longest || !self.claim(neighbour, frame, texel) {
+                if (new_high - new_low).max_element() > longest
+                    || !self.claim_in(neighbour, corners, &frame, texel)
+                {
                     continue;
                 }
                 (low, high) = (new_low, new_high);
@@ -157,44 +175,82 @@ impl Grower<'_> {
         Grown { triangles, frame, texel }
     }
 
+    /// [`Grower::claim`] in the frame that a chart grows in.
+    fn claim_in(&mut self, triangle: u32, corners: [DVec3; 3], frame: &Frame, texel: f64) -> bool {
+        let normal = self.surface.normals[triangle as usize];
+        let normal = DVec3::from_array(frame.axes.map(|axis| axis.dot(normal)));
+        let corners = corners.map(|p| (p.truncate() / texel).extend(p.z));
+        self.claim(corners, normal, DVec2::splat(texel), texel)
+    }
+
     /// Takes the texels of a triangle; false, and nothing is taken, if one of them is at another height already.
     ///
-    /// Two places of a surface inside the cone can differ in height by no more than its steepness times their distance.
-    fn claim(&mut self, triangle: u32, frame: Frame, texel: f64) -> bool {
-        let corners = self.surface.corner_places(triangle as usize).map(|p| frame.project(p) / texel);
-        let normal = self.surface.normals[triangle as usize];
-        let [nx, ny, nz] = frame.axes.map(|axis| axis.dot(normal));
-        let height_at =
-            |p: DVec2| corners[0].z - (nx * (p.x - corners[0].x) + ny * (p.y - corners[0].y)) / nz;
+    /// `corners` are x and y in texels, whose edges are `step`, and height. Two places of a surface inside the cone can
+    /// differ in height by no more than its steepness times their distance; and one texel cannot stand for places
+    /// that lie far apart, be they ever so close to each other seen from above.
+    fn claim(&mut self, corners: [DVec3; 3], normal: DVec3, step: DVec2, texel: f64) -> bool {
+        // Height gained by one texel along x and y.
+        let slope = -normal.truncate() * step / normal.z;
+        let height_at = |p: DVec2| corners[0].z + slope.dot(p - corners[0].truncate());
         self.cells.begin();
         let (cells, steepness) = (&mut self.cells, self.steepness);
         let fits = touched(corners.map(|c| c.truncate()), |x, y, closest| {
             let height = height_at(closest);
-            match cells.get_or_insert((x, y), Cell { closest, height }) {
-                None => true,
-                Some(other) => {
-                    let allowed = steepness * closest.distance(other.closest) + HEIGHT_TOLERANCE;
-                    (height - other.height).abs() <= allowed
-                }
+            let over_centre = height_at(DVec2::new(f64::from(x), f64::from(y)));
+            let Some(cell) = cells.get_or_insert((x, y), Cell { closest, height, range: [over_centre; 2] })
+            else {
+                return true;
+            };
+            let allowed = steepness * ((closest - cell.closest) * step).length() + HEIGHT_TOLERANCE * texel;
+            let range = [cell.range[0].min(over_centre), cell.range[1].max(over_centre)];
+            let fits = (height - cell.height).abs() <= allowed && range[1] - range[0] <= MOST_RANGE * texel;
+            if fits && range != cell.range {
+                cells.replace((x, y), Cell { range, ..cell });
             }
+            fits
         });
         if !fits {
-            cells.roll_back();
+            self.cells.roll_back();
         }
         fits
     }
+
+    /// Lays a chart flat, and drops from it the triangles that the turned grid brings over others.
+    fn settle(&mut self, mut chart: Grown) -> (Grown, Flat) {
+        let flat = flatten(self.surface, &chart, self.params.max_side);
+        self.cells.clear();
+        let before = chart.triangles.len();
+        let mut triangles = std::mem::take(&mut chart.triangles);
+        triangles.retain(|&t| {
+            let normal = self.surface.normals[t as usize];
+            let normal = DVec3::from_array(flat.frame.axes.map(|axis| axis.dot(normal)));
+            let corners = self.surface.corner_places(t as usize).map(|place| {
+                let [x, y] = flat.snapped_texel_of(place);
+                let offset = DVec2::new(f64::from(x), f64::from(y)) / f64::from(TEXEL_FRACTION) - 0.5;
+                offset.extend(flat.frame.project(place).z)
+            });
+            self.claim(corners, normal, flat.step, chart.texel) || self.dropped >= self.most_dropped
+        });
+        self.dropped += before - triangles.len();
+        chart.triangles = triangles;
+        (chart, flat)
+    }
 }
 
-fn bounds(frame: Frame, corners: [DVec3; 3]) -> [DVec2; 2] {
-    let [a, b, c] = corners.map(|p| frame.project(p).truncate());
+fn bounds(corners: [DVec3; 3]) -> [DVec2; 2] {
+    let [a, b, c] = corners.map(|c| c.truncate());
     [a.min(b).min(c), a.max(b).max(c)]
 }
 
-/// What lies over a texel: the place of the first triangle closest to the texel's centre, in texels.
+/// What lies over a texel.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cell {
+    /// Place of the first triangle closest to the texel's centre, in texels.
     closest: DVec2,
+    /// Its height.
     height: f64,
+    /// Least and greatest height over the centre of all triangles' planes.
+    range: [f64; 2],
 }
 
 /// Cells by texel: open addressing, emptied in no time by a new generation.
@@ -207,6 +263,8 @@ struct Cells {
     used: Vec<u32>,
     /// Where the current triangle's begin in `used`.
     begun: usize,
+    /// What the current triangle replaced.
+    replaced: Vec<(u32, Cell)>,
 }
 
 impl Cells {
@@ -217,6 +275,7 @@ impl Cells {
             generation: 1,
             used: vec![],
             begun: 0,
+            replaced: vec![],
         }
     }
 
@@ -229,10 +288,14 @@ impl Cells {
     /// From here on insertions can be rolled back.
     fn begin(&mut self) {
         self.begun = self.used.len();
+        self.replaced.clear();
     }
 
-    /// Frees what was inserted since [`Cells::begin`]. The last in go first, so no chain of slots is broken.
+    /// Undoes what was done since [`Cells::begin`]. The last in go first, so no chain of slots is broken.
     fn roll_back(&mut self) {
+        for (slot, cell) in self.replaced.drain(..).rev() {
+            self.values[slot as usize] = cell;
+        }
         for slot in self.used.drain(self.begun..).rev() {
             self.keys[slot as usize].0 = 0;
         }
@@ -250,6 +313,12 @@ impl Cells {
         self.values[slot] = cell;
         self.used.push(slot as u32);
         None
+    }
+
+    /// Replaces the cell of a texel that is there.
+    fn replace(&mut self, texel: (i32, i32), cell: Cell) {
+        let slot = self.slot_of(texel);
+        self.replaced.push((slot as u32, std::mem::replace(&mut self.values[slot], cell)));
     }
 
     fn slot_of(&self, texel: (i32, i32)) -> usize {

@@ -96,8 +96,8 @@ impl Fit {
     /// What the value of a point is multiplied with. Sums to 1 over the points of the fit; negative beyond the far end
     /// of a neighbourhood that lies to one side.
     pub fn coefficient(&self, p: Weighed) -> f32 {
-        let tilt = self.slope[0] * (p.tangent[0] - self.center[0])
-            + self.slope[1] * (p.tangent[1] - self.center[1]);
+        let tilt =
+            self.slope[0] * (p.tangent[0] - self.center[0]) + self.slope[1] * (p.tangent[1] - self.center[1]);
         p.weight * self.inverse_sum * (1.0 - tilt)
     }
 }

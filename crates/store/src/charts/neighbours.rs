@@ -65,7 +65,10 @@ impl PointCells {
         // `as` saturates and takes NaN for 0, so nothing here can overflow.
         let cell = |p: Vec3| {
             let steps = (p - self.origin_rest) / self.quantum_m;
-            steps.floor().to_array().map(|c| (c as i64).clamp(-1, i64::from(MAX_COORDINATE) + 1) >> self.shift)
+            steps
+                .floor()
+                .to_array()
+                .map(|c| (c as i64).clamp(-1, i64::from(MAX_COORDINATE) + 1) >> self.shift)
         };
         CellBox { first: cell(position_rest - radius_m), last: cell(position_rest + radius_m) }
     }

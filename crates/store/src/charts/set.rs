@@ -176,9 +176,7 @@ pub(super) struct Chart {
 impl Chart {
     /// Where a place of the chart lies in its page.
     pub(super) fn uv_of(&self, place: DVec3) -> ChartUv {
-        let fraction = f64::from(TEXEL_FRACTION);
-        let at = self.flat.texel_of(place);
-        let [x, y] = [at.x, at.y].map(|t| ((t + 0.5) * fraction).round() as u16);
+        let [x, y] = self.flat.snapped_texel_of(place);
         ChartUv {
             page: self.page,
             x: self.corner[0] * TEXEL_FRACTION + x,

@@ -110,6 +110,12 @@ impl Surface {
 
     /// Pairs the half-edges of one edge that run opposite ways, the flattest continuation first.
     fn connect_edge(&mut self, lower: u32, edge: &[(u32, u32)]) {
+        if let &[(_, a), (_, b)] = edge {
+            let starts = [a, b].map(|h| self.corners[(h / 3) as usize][(h % 3) as usize]);
+            if starts[0] != starts[1] {
+                return self.join(a, b);
+            }
+        }
         let mut ways: [Vec<(u32, u32)>; 2] = [Vec::new(), Vec::new()];
         for &(_, half_edge) in edge {
             let (t, k) = ((half_edge / 3) as usize, (half_edge % 3) as usize);

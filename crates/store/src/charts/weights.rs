@@ -82,6 +82,13 @@ pub struct Candidate {
     weighed: Weighed,
 }
 
+impl Candidate {
+    /// How much it counts before the fit, 0 … 1.
+    pub fn weight(&self) -> f32 {
+        self.weighed.weight
+    }
+}
+
 /// The points of one set, ready to be found.
 #[derive(Clone, Debug)]
 pub struct PointNeighbours {

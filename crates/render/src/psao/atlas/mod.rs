@@ -13,9 +13,10 @@ mod upload;
 use std::sync::Arc;
 
 use dapple_scene::Scene;
-use dapple_store::charts::{ChartError, ChartParams, ChartSet, Cuts, PointNeighbours, WeightParams};
+use dapple_store::charts::{
+    AtlasError, ChartError, ChartParams, ChartSet, Cuts, InstanceKey, PointNeighbours, WeightParams,
+};
 use dapple_store::points::PointLayout;
-use glam::Vec3;
 
 pub use pages::{DirtyBand, Placement};
 use pages::{Pages, PlacedPages};
@@ -83,7 +84,18 @@ pub struct VisibilityAtlas {
     fresh: Vec<usize>,
     /// Texels whose two values may differ.
     fading: Vec<u32>,
-    failed: Vec<(u32, ChartError)>,
+    failed: Vec<(u32, BuildError)>,
+}
+
+/// Why an instance cannot be shown with its visibility.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BuildError {
+    /// Its mesh cannot be cut into charts.
+    #[error(transparent)]
+    Charts(#[from] ChartError),
+    /// There is no room for its texels.
+    #[error(transparent)]
+    Atlas(#[from] AtlasError),
 }
 
 enum SetState {
@@ -94,21 +106,18 @@ enum SetState {
 
 struct ReadySet {
     charts: Arc<ChartSet>,
-    charts_key: ChartsKey,
+    charts_key: InstanceKey,
     table: PointTexels,
     sums: Sums,
     placements: Vec<Placement>,
     placed: PlacedPages,
 }
 
-/// Instances with equal keys have equal charts: mesh, bits of `rest_from_mesh`, bits of the texel's edge.
-type ChartsKey = (u32, [u32; 9], u32);
-
 /// The set that is being made.
 struct Job {
     set: usize,
     charts: Arc<ChartSet>,
-    charts_key: ChartsKey,
+    charts_key: InstanceKey,
     stage: Stage,
 }
 
@@ -216,17 +225,12 @@ impl VisibilityAtlas {
         let instance_index = self.layout.sets()[set].instance;
         let instance = &scene.instances[instance_index as usize];
         let mesh = &scene.meshes[instance.mesh as usize];
-        let params = chart_params(
-            self.layout.spacing_m(),
-            self.moves[instance_index as usize],
-            instance.rest_from_mesh.determinant() < 0.0,
-            self.params.texel_factor,
-        );
-        let key = (
-            instance.mesh,
-            instance.rest_from_mesh.to_cols_array().map(f32::to_bits),
-            params.texel_m.to_bits(),
-        );
+        let defaults = ChartParams::for_spacing(self.layout.spacing_m(), self.moves[instance_index as usize]);
+        let key = InstanceKey {
+            mesh: instance.mesh,
+            rest_from_mesh: instance.rest_from_mesh,
+            texel_m: defaults.texel_m * self.params.texel_factor,
+        };
         let same = self.sets.iter().find_map(|state| match state {
             SetState::Ready(ready) if ready.charts_key == key => Some(ready.charts.clone()),
             _ => None,
@@ -234,13 +238,16 @@ impl VisibilityAtlas {
         let cost = if same.is_some() { 1 } else { mesh.triangles.len() / TRIANGLES_A_TEXEL + 1 };
         let charts = match same {
             Some(charts) => charts,
-            None => match ChartSet::new(&rest_positions(scene, instance_index), &mesh.triangles, &params) {
-                Ok(charts) => Arc::new(charts),
-                Err(error) => {
-                    self.failed.push((instance_index, error));
-                    return (None, cost);
+            None => {
+                match ChartSet::new(&scene.rest_positions(instance_index as usize), &mesh.triangles, &params)
+                {
+                    Ok(charts) => Arc::new(charts),
+                    Err(error) => {
+                        self.failed.push((instance_index, error.into()));
+                        return (None, cost);
+                    }
                 }
-            },
+            }
         };
         (Some(Job { set, charts, charts_key: key, stage: Stage::Sites }), cost)
     }
@@ -254,7 +261,8 @@ impl VisibilityAtlas {
         job.stage = match job.stage {
             Stage::Sites => {
                 let mesh = &scene.meshes[scene.instances[set.instance as usize].mesh as usize];
-                let sites = job.charts.sites(&rest_positions(scene, set.instance), &mesh.triangles);
+                let positions_rest = job.charts_key.positions_rest(&mesh.positions);
+                let sites = job.charts.sites(&positions_rest, &mesh.triangles);
                 let neighbours = PointNeighbours::new(&layout, set, &self.params.weights);
                 cost = sites.len() / 4 + mesh.triangles.len() / 4;
                 let cuts = self.cuts.as_ref().and_then(|cuts| cuts.for_sites(set.instance, &sites));
@@ -304,11 +312,17 @@ impl VisibilityAtlas {
         &mut self,
         set: usize,
         charts: Arc<ChartSet>,
-        charts_key: ChartsKey,
+        charts_key: InstanceKey,
         table: PointTexels,
         sums: Sums,
     ) {
-        let placements: Vec<Placement> = charts.pages().iter().map(|&size| self.pages.place(size)).collect();
+        let placements = match self.pages.place(charts.pages()) {
+            Ok(placements) => placements,
+            Err(error) => {
+                self.failed.push((self.layout.sets()[set].instance, error.into()));
+                return;
+            }
+        };
         for (page, (placement, size)) in placements.iter().zip(charts.pages()).enumerate() {
             let first = charts.first_texel_of_page(page);
             self.pages.fill(*placement, *size, |i| [255, sums.value(first + i)]);
@@ -391,16 +405,4 @@ impl Job {
         };
         self.charts.memory_bytes() + stage as u64
     }
-}
-
-/// How the charts of an instance are made.
-fn chart_params(spacing_m: f32, moves: bool, mirrored: bool, texel_factor: f32) -> ChartParams {
-    let params = ChartParams::for_spacing(spacing_m, moves);
-    ChartParams { texel_m: params.texel_m * texel_factor, mirrored, ..params }
-}
-
-/// The vertices of an instance at rest, metres.
-fn rest_positions(scene: &Scene, instance: u32) -> Vec<Vec3> {
-    let placed = &scene.instances[instance as usize];
-    scene.meshes[placed.mesh as usize].positions.iter().map(|&p| placed.rest_from_mesh * p).collect()
 }

@@ -2,18 +2,7 @@
 
 use std::ops::Range;
 
-use dapple_store::charts::{ChartSet, PageSize};
-
-/// Where a page lies.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Placement {
-    /// Index of the layer.
-    pub layer: u32,
-    /// First column, texels.
-    pub x: u32,
-    /// First row, texels.
-    pub y: u32,
-}
+use dapple_store::charts::{Atlas, AtlasError, ChartSet, PageSize, Placement};
 
 /// Rows of a layer whose texels changed.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -25,7 +14,10 @@ pub struct DirtyBand {
 }
 
 /// Sides of layers, texels. No page is longer than the smaller.
-const SIDES: [u32; 2] = [1024, 2048];
+const SIDES: [u16; 2] = [1024, 2048];
+
+/// As many as every graphics card takes.
+const MOST_LAYERS: u16 = 256;
 
 /// Texels a point, gaps between pages counted, by which the side is chosen.
 const TEXELS_A_POINT: usize = 4;
@@ -43,22 +35,15 @@ pub(super) struct Pages {
     texels: Vec<[u8; 2]>,
     /// One for each row of each layer.
     dirty: Vec<bool>,
-    /// Per layer the height of what is occupied: runs of columns, from the left.
-    skylines: Vec<Vec<Step>>,
-}
-
-/// Columns up to `end` are occupied down to row `y`.
-#[derive(Clone, Copy, Debug)]
-struct Step {
-    end: u32,
-    y: u32,
+    places: Atlas,
 }
 
 impl Pages {
     pub(super) fn for_points(points: usize) -> Pages {
         let wanted = points * TEXELS_A_POINT;
-        let side = if wanted <= (SIDES[0] * SIDES[0]) as usize { SIDES[0] } else { SIDES[1] };
-        Pages { side, texels: Vec::new(), dirty: Vec::new(), skylines: Vec::new() }
+        let side = if wanted <= usize::from(SIDES[0]).pow(2) { SIDES[0] } else { SIDES[1] };
+        let places = Atlas::new(side, MOST_LAYERS);
+        Pages { side: u32::from(side), texels: Vec::new(), dirty: Vec::new(), places }
     }
 
     pub(super) fn side(&self) -> u32 {
@@ -66,7 +51,7 @@ impl Pages {
     }
 
     pub(super) fn layers(&self) -> u32 {
-        self.skylines.len() as u32
+        u32::from(self.places.layers())
     }
 
     pub(super) fn texel_count(&self) -> usize {
@@ -90,48 +75,40 @@ impl Pages {
         self.texels.len() * size_of::<[u8; 2]>() + self.dirty.len()
     }
 
-    /// Finds a place for a page: the highest free one in the first layer that has room, or a new layer.
-    pub(super) fn place(&mut self, size: PageSize) -> Placement {
-        let (width, height) = (u32::from(size.width), u32::from(size.height));
-        let side = self.side;
-        let found = self.skylines.iter().enumerate().find_map(|(layer, skyline)| {
-            let (x, y) = lowest(skyline, width, side)?;
-            (y + height <= side).then_some(Placement { layer: layer as u32, x, y })
-        });
-        let placement = found.unwrap_or_else(|| {
-            let layer = self.layers();
-            self.skylines.push(vec![Step { end: side, y: 0 }]);
-            self.texels.resize(self.texels.len() + (side * side) as usize, OPEN);
-            self.dirty.resize(self.dirty.len() + side as usize, true);
+    /// Finds places for the pages of an instance; makes new layers if there is no room.
+    pub(super) fn place(&mut self, sizes: &[PageSize]) -> Result<Vec<Placement>, AtlasError> {
+        let placements = self.places.insert(sizes)?;
+        let rows = (self.layers() * self.side) as usize;
+        if rows > self.dirty.len() {
+            self.texels.resize(rows * self.side as usize, OPEN);
+            self.dirty.resize(rows, true);
             // A larger texture is a new one: everything must be uploaded.
             self.dirty.fill(true);
-            Placement { layer, x: 0, y: 0 }
-        });
-        occupy(&mut self.skylines[placement.layer as usize], placement.x, width, placement.y + height);
-        placement
+        }
+        Ok(placements)
     }
 
     /// Writes the texels of a page; `value` takes their index within the page.
     pub(super) fn fill(&mut self, place: Placement, size: PageSize, value: impl Fn(u32) -> [u8; 2]) {
         let mut index = 0;
         for y in 0..u32::from(size.height) {
-            let start = self.address(place.layer, place.x, place.y + y) as usize;
+            let start = self.address(u32::from(place.layer), u32::from(place.x), u32::from(place.y) + y) as usize;
             for texel in &mut self.texels[start..start + usize::from(size.width)] {
                 *texel = value(index);
                 index += 1;
             }
-            self.dirty[(place.layer * self.side + place.y + y) as usize] = true;
+            self.dirty[start / self.side as usize] = true;
         }
     }
 
     /// Ends the fade of all texels of a page.
     pub(super) fn settle_page(&mut self, place: Placement, size: PageSize) {
         for y in 0..u32::from(size.height) {
-            let start = self.address(place.layer, place.x, place.y + y) as usize;
+            let start = self.address(u32::from(place.layer), u32::from(place.x), u32::from(place.y) + y) as usize;
             for texel in &mut self.texels[start..start + usize::from(size.width)] {
                 texel[0] = texel[1];
             }
-            self.dirty[(place.layer * self.side + place.y + y) as usize] = true;
+            self.dirty[start / self.side as usize] = true;
         }
     }
 
@@ -176,47 +153,6 @@ impl Pages {
     }
 }
 
-/// The free place of a width whose top row is highest up, of those the leftmost.
-fn lowest(skyline: &[Step], width: u32, side: u32) -> Option<(u32, u32)> {
-    let mut best: Option<(u32, u32)> = None;
-    let mut start = 0;
-    for (i, step) in skyline.iter().enumerate() {
-        if start + width > side {
-            break;
-        }
-        let covered = skyline[i..].iter().scan(start, |begin, s| {
-            let from = std::mem::replace(begin, s.end);
-            (from < start + width).then_some(s.y)
-        });
-        let y = covered.max().unwrap_or(0);
-        if best.is_none_or(|(_, best)| y < best) {
-            best = Some((start, y));
-        }
-        start = step.end;
-    }
-    best
-}
-
-/// Raises the columns `x .. x + width` to `y`.
-fn occupy(skyline: &mut Vec<Step>, x: u32, width: u32, y: u32) {
-    let end = x + width;
-    let mut raised = Vec::with_capacity(skyline.len() + 2);
-    let mut start = 0;
-    for &step in skyline.iter() {
-        if start < x {
-            raised.push(Step { end: step.end.min(x), y: step.y });
-        }
-        if start < end && end <= step.end {
-            raised.push(Step { end, y });
-        }
-        if step.end > end {
-            raised.push(step);
-        }
-        start = step.end;
-    }
-    *skyline = raised;
-}
-
 /// Pages of one instance where they lie: from a number of a texel to its address.
 #[derive(Clone, Debug)]
 pub(super) struct PlacedPages {
@@ -236,7 +172,7 @@ impl PlacedPages {
         let place = |(page, (p, size)): (usize, (&Placement, &PageSize))| PlacedPage {
             first_texel: charts.first_texel_of_page(page),
             width: u32::from(size.width),
-            address: (p.layer * side + p.y) * side + p.x,
+            address: (u32::from(p.layer) * side + u32::from(p.y)) * side + u32::from(p.x),
         };
         PlacedPages { pages: placements.iter().zip(charts.pages()).enumerate().map(place).collect(), side }
     }
@@ -278,51 +214,12 @@ impl Walk<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn pages_do_not_overlap(
-            sizes in prop::collection::vec((1u16..400, 1u16..400), 1..60),
-            large in prop::option::of(1000u16..=1024),
-        ) {
-            let mut pages = Pages::for_points(1000);
-            let mut taken = Vec::new();
-            let large = large.map(|side| (side, side));
-            for (width, height) in sizes.into_iter().chain(large) {
-                let size = PageSize { width, height };
-                let place = pages.place(size);
-                let (w, h) = (u32::from(width), u32::from(height));
-                prop_assert!(place.layer < pages.layers());
-                prop_assert!(place.x + w <= pages.side() && place.y + h <= pages.side());
-                for &(other, ow, oh) in &taken {
-                    let other: Placement = other;
-                    let apart = other.layer != place.layer
-                        || other.x + ow <= place.x
-                        || place.x + w <= other.x
-                        || other.y + oh <= place.y
-                        || place.y + h <= other.y;
-                    prop_assert!(apart, "{place:?} {w}×{h} lies on {other:?} {ow}×{oh}");
-                }
-                taken.push((place, w, h));
-            }
-        }
-    }
-
-    #[test]
-    fn small_pages_fill_a_layer_before_the_next_begins() {
-        let mut pages = Pages::for_points(1000);
-        for _ in 0..(1024 / 64) * (1024 / 32) {
-            assert_eq!(pages.place(PageSize { width: 64, height: 32 }).layer, 0);
-        }
-        assert_eq!(pages.place(PageSize { width: 64, height: 32 }).layer, 1);
-    }
 
     #[test]
     fn dirty_rows_are_told_once() {
         let mut pages = Pages::for_points(1000);
         let size = PageSize { width: 10, height: 40 };
-        let place = pages.place(size);
+        let place = pages.place(&[size]).unwrap()[0];
         assert_eq!(pages.take_dirty(), [DirtyBand { layer: 0, y: 0..1024 }], "a new layer");
         pages.fill(place, size, |i| [i as u8, 7]);
         assert_eq!(pages.take_dirty(), [DirtyBand { layer: 0, y: 0..40 }]);

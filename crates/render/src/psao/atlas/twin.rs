@@ -1,8 +1,10 @@
 //! The look-up in Rust: what a fragment reads, as a graphics card does it.
 
 use dapple_store::charts::{ChartUv, TEXEL_FRACTION};
+use rayon::prelude::*;
 
 use super::{ReadySet, SetState, VisibilityAtlas};
+use crate::gbuffer::GBuffer;
 
 impl VisibilityAtlas {
     /// Visibility 0 … 1 at a place of a triangle; `barycentrics` are the weights of the second and third corner. `fade` is
@@ -18,16 +20,27 @@ impl VisibilityAtlas {
         } else {
             let (page, x, y) = ready.charts.texel_at(triangle as usize, barycentrics);
             let Some(place) = ready.placements.get(usize::from(page)) else { return 1.0 };
-            self.bilinear(place.layer, place.x as f32 + x, place.y as f32 + y, fade)
+            self.bilinear(u32::from(place.layer), f32::from(place.x) + x, f32::from(place.y) + y, fade)
         };
         (value / 255.0).clamp(0.0, 1.0)
+    }
+
+    /// Visibility of each sample of a picture (1 for the background), in parallel in the caller's rayon pool.
+    pub fn reconstruct(&self, gbuffer: &GBuffer, fade: f32) -> Vec<f32> {
+        let samples = gbuffer.samples().par_iter().with_min_len(1024);
+        samples
+            .map(|s| match s.is_covered() {
+                true => self.visibility(s.instance, s.triangle, s.barycentrics, fade),
+                false => 1.0,
+            })
+            .collect()
     }
 
     /// The texel that a corner lies on.
     fn corner_value(&self, ready: &ReadySet, uv: ChartUv, fade: f32) -> f32 {
         let Some(place) = ready.placements.get(usize::from(uv.page)) else { return 255.0 };
         let texel = |at: u16| u32::from(at / TEXEL_FRACTION);
-        self.mix(place.layer, place.x + texel(uv.x), place.y + texel(uv.y), fade)
+        self.mix(u32::from(place.layer), u32::from(place.x) + texel(uv.x), u32::from(place.y) + texel(uv.y), fade)
     }
 
     /// Four texels around a place, which is in texels with centres at halves.

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use dapple_store::charts::{ChartError, ChartSet};
+use dapple_store::charts::{ChartSet, Placement};
 use dapple_store::points::PointLayout;
 
-use super::{DirtyBand, Placement, SetState, VisibilityAtlas};
+use super::{BuildError, DirtyBand, SetState, VisibilityAtlas};
 
 /// What a texel is made of, for debug views.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -57,8 +57,8 @@ impl VisibilityAtlas {
         std::mem::take(&mut self.ready)
     }
 
-    /// Instances whose mesh could not be cut into charts, and why. They stay open.
-    pub fn failed(&self) -> &[(u32, ChartError)] {
+    /// Instances that could not be made ready, and why. They stay open.
+    pub fn failed(&self) -> &[(u32, BuildError)] {
         &self.failed
     }
 
@@ -98,12 +98,12 @@ impl VisibilityAtlas {
             let SetState::Ready(ready) = state else { continue };
             for chart in 0..ready.charts.chart_count() {
                 let (page, [x, y, width, height]) = ready.charts.chart_rectangle(chart);
-                let Some(place) = ready.placements.get(usize::from(page)).filter(|p| p.layer == layer) else {
+                let Some(place) = ready.placements.get(usize::from(page)).filter(|p| u32::from(p.layer) == layer) else {
                     continue;
                 };
                 for row in 0..u32::from(height) {
-                    let start =
-                        ((place.y + u32::from(y) + row) * self.side() + place.x + u32::from(x)) as usize;
+                    let (x, y) = (u32::from(place.x) + u32::from(x), u32::from(place.y) + u32::from(y) + row);
+                    let start = (y * self.side() + x) as usize;
                     for info in &mut infos[start..start + usize::from(width)] {
                         info.chart = chart + 1;
                     }

@@ -70,3 +70,12 @@ pub(super) fn moebius(width_m: f32, quads: u32) -> Shape {
         Quat::from_rotation_y(u * std::f32::consts::TAU) * (Vec3::X + tilt)
     })
 }
+
+/// A number in 0 … 1 from a seed and an index.
+pub(super) fn random(seed: u64, index: u64) -> f32 {
+    let mut z =
+        seed.wrapping_add(index.wrapping_mul(0x9e37_79b9_7f4a_7c15)).wrapping_add(0x1234_5678_9abc_def1);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 40) as f32 / (1u64 << 24) as f32
+}
