@@ -75,15 +75,15 @@ fn least_squares_beats_the_papers_kernel_on_every_class_of_surface() {
     let surfaces = &found["surfaces"];
     let places = |class: &str| row(surfaces, None, "mls")[class]["places"].as_u64().unwrap();
     assert!(places("all") > 4000, "{out}");
-    assert_eq!(places("static_front") + places("static_back") + places("movers"), places("all"));
-    assert!(places("movers") > 0 && places("static_back") > 0);
+    assert_eq!(places("static") + places("backs") + places("movers"), places("all"));
+    assert!(places("movers") > 0 && places("backs") > 0);
     let db = |method, class: &str| row(surfaces, None, method)[class]["psnr_db"].as_f64().unwrap();
-    for class in ["all", "static_front", "static_back"] {
+    for class in ["all", "static", "backs"] {
         assert!(
             db("mls", class) > db("hat", class) + 1.0 && db("hat", class) > db("paper", class),
             "{class}: {out}"
         );
     }
-    assert!(db("atlas", "static_front") > db("hat", "static_front") + 1.0, "{out}");
+    assert!(db("atlas", "static") > db("hat", "static") + 1.0, "{out}");
     assert!(row(surfaces, None, "paper")["discarded"].as_u64().unwrap() > 0, "{out}");
 }

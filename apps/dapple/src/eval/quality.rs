@@ -46,10 +46,12 @@ struct SurfaceRow {
     points: u64,
     method: &'static str,
     all: Class,
-    /// What stands still, seen from the front, and from the back of double-sided surfaces.
-    static_front: Class,
-    static_back: Class,
+    /// Fronts of what stands still, and of what the animation moves.
+    #[serde(rename = "static")]
+    still: Class,
     movers: Class,
+    /// Backs of double-sided surfaces, which are the insides of closed ones.
+    backs: Class,
     /// Points that the paper's cells and buckets had no room for.
     #[serde(skip_serializing_if = "Option::is_none")]
     discarded: Option<u32>,
@@ -154,9 +156,9 @@ impl Run<'_> {
                     points: store.layout().len() as u64,
                     method,
                     all: class(&|_| true),
-                    static_front: class(&|i| !samples.moving[i] && !samples.places[i].back),
-                    static_back: class(&|i| !samples.moving[i] && samples.places[i].back),
-                    movers: class(&|i| samples.moving[i]),
+                    still: class(&|i| !samples.places[i].back && !samples.moving[i]),
+                    movers: class(&|i| !samples.places[i].back && samples.moving[i]),
+                    backs: class(&|i| samples.places[i].back),
                     discarded,
                 });
             }
@@ -267,19 +269,19 @@ fn db(value: Option<f64>) -> String {
 fn surface_table(rows: &[SurfaceRow]) -> String {
     let mut text = String::new();
     if let Some(row) = rows.first() {
-        let (all, backs, movers) = (row.all.places, row.static_back.places, row.movers.places);
+        let (all, backs, movers) = (row.all.places, row.backs.places, row.movers.places);
         let _ =
             writeln!(text, "{}: {all} places on surfaces, {backs} on backs, {movers} on movers\n", row.scene);
     }
-    text.push_str("| N | points | method | all dB | static dB | static, backs dB | movers dB | points discarded |\n|---|---|---|---|---|---|---|---|\n");
+    text.push_str("| N | points | method | all dB | static dB | movers dB | backs dB | points discarded |\n|---|---|---|---|---|---|---|---|\n");
     for row in rows {
         let SurfaceRow { points_per_m2, points, method, .. } = row;
-        let [all, front, back, movers] =
-            [&row.all, &row.static_front, &row.static_back, &row.movers].map(|c| db(c.psnr_db));
+        let [all, still, movers, backs] =
+            [&row.all, &row.still, &row.movers, &row.backs].map(|c| db(c.psnr_db));
         let discarded = row.discarded.map_or_else(|| "–".to_owned(), |d| d.to_string());
         let _ = writeln!(
             text,
-            "| {points_per_m2} | {points} | {method} | {all} | {front} | {back} | {movers} | {discarded} |"
+            "| {points_per_m2} | {points} | {method} | {all} | {still} | {movers} | {backs} | {discarded} |"
         );
     }
     text
