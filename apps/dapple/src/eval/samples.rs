@@ -13,6 +13,8 @@ use dapple_trace::rtao::{RtaoParams, Site, trace_visibility};
 pub(super) struct Place {
     pub(super) rest: RestSurface,
     pub(super) triangle: u32,
+    /// On the side from which the triangle's vertices run clockwise.
+    pub(super) back: bool,
     /// Weights of vertices 1 and 2.
     pub(super) barycentrics: [f32; 2],
     pub(super) position_world: Vec3,
@@ -67,7 +69,8 @@ impl Samples {
             .map(|(key, p)| Site { position_world: p.position_world, normal_world: p.normal_world, key })
             .collect();
         let mut truth = vec![0.0; sites.len()];
-        let rtao = RtaoParams { rays: params.rays, radius_m: params.radius_m, seed: u64::from(params.seed) + 1 };
+        let rtao =
+            RtaoParams { rays: params.rays, radius_m: params.radius_m, seed: u64::from(params.seed) + 1 };
         trace_visibility(tracer, &sites, &rtao, &mut truth);
         Ok(Samples { places, moving, truth })
     }
@@ -104,7 +107,7 @@ fn place(
     let in_world = indices.map(|v| world.transform_point3(vertices[v as usize]));
     let (position_world, normal_world) = on(in_world, world.matrix3.determinant() < 0.0)?;
     let rest = RestSurface { instance, position_rest, normal_rest };
-    Some(Place { rest, triangle, barycentrics, position_world, normal_world })
+    Some(Place { rest, triangle, back, barycentrics, position_world, normal_world })
 }
 
 /// Errors of one method over a class of places.

@@ -97,7 +97,8 @@ fn turned_box(middle: Vec3, half: Vec3) -> Mesh {
     let mut mesh = Mesh::default();
     for axis in 0..3 {
         for sign in [-1.0f32, 1.0] {
-            let unit = |i: usize| Vec3::from_array(std::array::from_fn(|k| if k == i % 3 { 1.0 } else { 0.0 }));
+            let unit =
+                |i: usize| Vec3::from_array(std::array::from_fn(|k| if k == i % 3 { 1.0 } else { 0.0 }));
             let normal = unit(axis) * sign;
             let right = unit(axis + 1);
             let up = normal.cross(right);

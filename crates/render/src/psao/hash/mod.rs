@@ -176,7 +176,8 @@ impl Builder {
     fn add(&mut self, grid: &VirtualGrid, cell: [u32; 3], point: usize, word: u32) {
         let key = grid.key(cell);
         let bucket = &mut self.buckets[bucket_of(grid, cell) as usize];
-        let at = bucket.iter().position(|&entry| entry == 0 || self.cells[entry as usize - 1][CELL_POINTS] == key);
+        let at =
+            bucket.iter().position(|&entry| entry == 0 || self.cells[entry as usize - 1][CELL_POINTS] == key);
         let Some(at) = at else {
             self.overflow.bucket += 1;
             return;
