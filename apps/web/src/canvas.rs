@@ -54,9 +54,8 @@ impl Screen {
     ) -> Result<Screen, String> {
         let formats = surface.get_capabilities(&gpu.adapter).formats;
         // The viewer encodes by itself, so that both interfaces show the same.
-        let plain = |format: &&TextureFormat| {
-            matches!(format, TextureFormat::Rgba8Unorm | TextureFormat::Bgra8Unorm)
-        };
+        let plain =
+            |format: &&TextureFormat| matches!(format, TextureFormat::Rgba8Unorm | TextureFormat::Bgra8Unorm);
         let format =
             *formats.iter().find(plain).ok_or("the canvas offers no format of 8 plain bits a channel")?;
         let config = wgpu::SurfaceConfiguration {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dapple_client::viewer::{DebugView, DrawOptions, LoadProgress, Viewer, ViewerConfig};
+use dapple_client::viewer::{DebugView, DrawOptions, LoadProgress, Method, Viewer, ViewerConfig};
 use dapple_render::shade::ShadeParams;
 use dapple_scene::{NoFiles, Scene};
 use dapple_stream::{Limits, Recording, Replay};
@@ -161,7 +161,8 @@ impl Core {
         let camera = self.steering.camera(scene, self.clock.time_s());
         let (size, time_s) = (self.screen.size(), self.clock.time_s());
         let options = &self.options;
-        let drew = self.screen.draw(|gpu, target| viewer.draw(gpu, target, size, &camera, time_s, now_s, options));
+        let drew =
+            self.screen.draw(|gpu, target| viewer.draw(gpu, target, size, &camera, time_s, now_s, options));
         self.changed = false;
         if drew.map_err(|reason| JsError::new(&reason))? {
             self.pictures.add(now_s, 1.0);
@@ -194,9 +195,15 @@ impl Core {
     /// How visibility is found, by name.
     #[wasm_bindgen(js_name = setMethod)]
     pub fn set_method(&mut self, name: &str) -> Result<(), JsError> {
-        self.options.method = names::method(name)?;
+        self.options.method = self.method(name)?;
         self.changed = true;
         Ok(())
+    }
+
+    /// Names of the methods that work on this device.
+    pub fn methods(&self) -> Vec<String> {
+        let works = |name: &&str| names::method(name).is_ok_and(|method| self.can(method));
+        names::methods().filter(works).map(str::to_owned).collect()
     }
 
     /// What is shown, by name.
@@ -211,7 +218,7 @@ impl Core {
     #[wasm_bindgen(js_name = setSplit)]
     pub fn set_split(&mut self, position: f32, method: &str) -> Result<(), JsError> {
         let position = if position.is_finite() { position.clamp(0.0, 1.0) } else { 0.5 };
-        self.options.split = Some((position, names::method(method)?));
+        self.options.split = Some((position, self.method(method)?));
         self.changed = true;
         Ok(())
     }
@@ -245,7 +252,8 @@ impl Core {
     pub fn stats(&mut self, now_s: f64) -> JsValue {
         let stats = self.shown.as_ref().map(|shown| shown.viewer.stats()).unwrap_or_default();
         let info = self.screen.gpu.adapter.get_info();
-        let backend = if info.backend == dapple_gpu::wgpu::Backend::BrowserWebGpu { "webgpu" } else { "webgl2" };
+        let backend =
+            if info.backend == dapple_gpu::wgpu::Backend::BrowserWebGpu { "webgpu" } else { "webgl2" };
         let age_s = stats.last_frame_s.map_or(JsValue::NULL, |last| (now_s - last).max(0.0).into());
         let (heap_bytes, card_bytes) = stats.memory_bytes;
         object(&[
@@ -276,7 +284,22 @@ impl Core {
         scene.iter().flat_map(|scene| &scene.warnings).map(|warning| warning.message.clone()).collect()
     }
 
-    /// Height of the picture per width, for what is measured in heights.
+    fn method(&self, name: &str) -> Result<Method, JsError> {
+        let method = names::method(name)?;
+        if !self.can(method) {
+            return Err(JsError::new(&format!(
+                "the method \"{name}\" needs storage buffers, which this device lacks"
+            )));
+        }
+        Ok(method)
+    }
+
+    fn can(&self, method: Method) -> bool {
+        method != Method::PsaoPaper
+            || self.screen.gpu.device.limits().max_storage_buffers_per_shader_stage > 0
+    }
+
+    /// Width of the picture per height.
     pub(crate) fn aspect(&self) -> f32 {
         let (width, height) = self.screen.size();
         width as f32 / height as f32
