@@ -35,6 +35,8 @@ class Viewer {
   #ready = Promise.withResolvers?.() ?? withResolvers();
   #streamed = false;
   #detach = [];
+  #settled = 0;
+  #working = false;
 
   constructor(canvas, options, progress) {
     this.#canvas = canvas;
@@ -142,26 +144,40 @@ class Viewer {
     requestAnimationFrame(this.#frame);
     const interval = Math.min(Math.max(now - this.#lastFrame, 4), 100);
     this.#lastFrame = now;
-    try {
-      const working = this.#work(Math.max(10, 0.5 * interval));
-      this.#core.frame(now / 1000);
-      if (this.#streamed && !working) this.#ready.resolve();
-    } catch (error) {
-      this.#fail(error instanceof Error ? error : new Error(String(error)));
-      return;
-    }
+    const working = this.#work(Math.max(10, 0.5 * interval));
+    this.#draw();
+    if (!this.#core) return;
+    // What was fetched last is taken by the first of these, causes work from the second on, and shows in the third.
+    this.#settled = this.#streamed && !working ? this.#settled + 1 : 0;
+    if (this.#settled === 3) this.#ready.resolve();
     if (this.#options.onStats && now - this.#lastStats > (this.#options.statsInterval ?? 500)) {
       this.#lastStats = now;
       this.#options.onStats(this.stats);
     }
   };
 
+  // Draws what has changed; true if anything had to be drawn.
+  #draw() {
+    try {
+      return this.#core?.frame(performance.now() / 1000) ?? false;
+    } catch (error) {
+      this.#fail(error instanceof Error ? error : new Error(String(error)));
+      return false;
+    }
+  }
+
   // Goes on with what a snapshot causes for about so many milliseconds; true while there is more.
   #work(budget) {
     const start = performance.now();
     for (;;) {
       const before = performance.now();
-      const { done, total } = this.#core.work(this.#texels);
+      let done, total;
+      try {
+        ({ done, total } = this.#core.work(this.#texels));
+      } catch (error) {
+        this.#fail(error instanceof Error ? error : new Error(String(error)));
+        return false;
+      }
       const after = performance.now();
       if (done >= total) {
         if (this.#working) this.#progress("light", total, total);
@@ -178,7 +194,6 @@ class Viewer {
       }
     }
   }
-  #working = false;
 
   #fail(error) {
     if (this.#abort.signal.aborted) return;
@@ -290,10 +305,9 @@ class Viewer {
   }
 
   async screenshot(type = "image/png") {
-    const core = this.#living();
-    core.invalidate();
+    this.#living().invalidate();
     // A canvas holds its picture only until the browser has shown it.
-    if (!core.frame(performance.now() / 1000)) throw new Error("The browser does not let the page draw now.");
+    if (!this.#draw()) throw new Error("The browser does not let the page draw now.");
     const blob = await new Promise((resolve) => this.#canvas.toBlob(resolve, type));
     if (!blob) throw new Error("The browser cannot write this picture.");
     return blob;
@@ -306,7 +320,7 @@ class Viewer {
     }
     this.#core?.resize(width, height);
     // A canvas that was resized is empty until it is drawn to.
-    if (this.#core) this.#core.frame(performance.now() / 1000);
+    this.#draw();
   }
 
   dispose() {
