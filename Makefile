@@ -5,7 +5,7 @@ export PATH := $(PATH):$(HOME)/.cargo/bin
 
 REPORT := $(CURDIR)/out/demo
 
-.PHONY: demo web test check fmt
+.PHONY: demo web test bench check fmt
 
 # The whole loop on the built-in scene, and a report of it.
 demo:
@@ -23,6 +23,11 @@ web:
 test:
 	@bash scripts/setup.sh test
 	cargo xtask ci
+
+# What looking visibility up costs on this machine's adapter: target/bench.json.
+bench:
+	@bash scripts/setup.sh
+	cargo bench --package dapple --bench lookup
 
 check:
 	cargo xtask check

@@ -3,9 +3,8 @@
 use std::error::Error;
 use std::sync::Arc;
 
-use dapple_client::{Client, PictureParams};
+use dapple_client::{Client, PictureParams, Reconstruction};
 use dapple_render::image::{Rgb8Image, ToneMap};
-use dapple_render::psao::Kernel;
 use dapple_render::shade::ShadeParams;
 use dapple_scene::{NoFiles, builtin};
 use dapple_server::{Server, ServerConfig};
@@ -49,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let camera = path.camera(&scene, &scene.pose(now_s));
     let params = PictureParams { width: 640, height: 360, supersample: 2, shade: ShadeParams::default() };
     let drawn = client.draw(&camera, now_s, &params)?;
-    let visibility = client.visibility(&drawn, &Kernel::default());
+    let visibility = client.visibility(&drawn, &Reconstruction::default());
     let Rgb8Image { width, height, pixels } = drawn.compose(Some(&visibility))?.to_rgb8(&ToneMap::default());
 
     image::save_buffer(&output, pixels.as_flattened(), width, height, image::ColorType::Rgb8)?;

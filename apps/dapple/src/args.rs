@@ -1,10 +1,14 @@
 //! Command-line arguments.
 
+mod watch;
+
 use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
+
+pub(crate) use watch::{InspectArgs, LightArgs, RecordArgs};
 
 /// Ray-traced ambient visibility, computed once on a server and streamed to thin clients.
 #[derive(Debug, Parser)]
@@ -22,9 +26,18 @@ pub(crate) enum Command {
     /// Render one picture of a scene.
     #[command(after_help = RENDER_EXAMPLES)]
     Render(RenderArgs),
+    /// Compare reconstructions of visibility over all surfaces of a scene, or near thin walls, with traced truth.
+    #[command(after_help = QUALITY_EXAMPLES)]
+    Quality(QualityArgs),
     /// Write a built-in scene as a GLB that any glTF viewer opens.
     #[command(after_help = SCENE_EXAMPLES)]
     Scene(SceneArgs),
+    /// Light a scene along its animation and keep the stream in a .dapple file.
+    #[command(after_help = watch::RECORD_EXAMPLES)]
+    Record(RecordArgs),
+    /// Say what is in a .dapple file, and whether it is whole.
+    #[command(after_help = watch::INSPECT_EXAMPLES)]
+    Inspect(InspectArgs),
 }
 
 const EVAL_EXAMPLES: &str = "\
@@ -42,6 +55,12 @@ Examples:
   dapple render --builtin atrium --time 4 --camera eye=2,1.7,5,target=0,1,0,fov=60 --method rtao -o truth.png
   dapple render city.glb --method psao --points 256 --radius auto --view visibility -o visibility.png
   dapple render --builtin atrium --view error -o error.png        psao against rtao, per pixel";
+
+const QUALITY_EXAMPLES: &str = "\
+Examples:
+  dapple quality                                 the built-in atrium at 256, 512 and 1024 points a square metre
+  dapple quality room.glb --radius auto --points 512 -o room.json
+  dapple quality --leaks                         two made scenes with thin walls";
 
 const SCENE_EXAMPLES: &str = "\
 Examples:
@@ -173,6 +192,35 @@ pub(crate) struct RenderArgs {
 }
 
 #[derive(Debug, Clone, Args)]
+pub(crate) struct QualityArgs {
+    #[command(flatten)]
+    pub(crate) scene: SceneChoice,
+    /// Points spawned a square metre (half are kept).
+    #[arg(long, value_delimiter = ',', value_name = "N,…", default_values_t = [256.0, 512.0, 1024.0])]
+    pub(crate) points: Vec<f32>,
+    /// Places on surfaces that are compared, about.
+    #[arg(long, value_name = "N", default_value_t = 40_000)]
+    pub(crate) samples: u32,
+    /// Rays a place of the ray-traced truth.
+    #[arg(long, value_name = "R", default_value_t = 512)]
+    pub(crate) reference_rays: u32,
+    /// Animation time in seconds.
+    #[arg(long, value_name = "T", default_value_t = 2.0, allow_hyphen_values = true)]
+    pub(crate) time: f64,
+    /// Compare near the thin walls of two made scenes instead.
+    #[arg(long, conflicts_with_all = ["scene", "builtin", "detail", "animation", "time", "radius"])]
+    pub(crate) leaks: bool,
+    #[command(flatten)]
+    pub(crate) visibility: VisibilityArgs,
+    /// Write every figure to this file.
+    #[arg(short, long, value_name = "FILE.json")]
+    pub(crate) output: Option<PathBuf>,
+    /// Threads; 0 is one for each core.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) threads: usize,
+}
+
+#[derive(Debug, Clone, Args)]
 pub(crate) struct SceneArgs {
     /// Which; without a name the scenes are listed.
     pub(crate) name: Option<String>,
@@ -213,7 +261,10 @@ pub(crate) enum View {
 /// A method as `eval` names it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Method {
+    /// Through the visibility atlas.
     Psao,
+    /// Least squares at every sample.
+    PsaoMls,
     /// With the radius in units of the spacing.
     PsaoHat {
         radius: f32,
@@ -227,7 +278,7 @@ pub(crate) enum Method {
 impl Method {
     /// Whether it depends on points and server rate.
     pub(crate) fn uses_points(self) -> bool {
-        matches!(self, Method::Psao | Method::PsaoHat { .. })
+        matches!(self, Method::Psao | Method::PsaoMls | Method::PsaoHat { .. })
     }
 }
 
@@ -235,6 +286,7 @@ impl std::fmt::Display for Method {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Method::Psao => write!(f, "psao"),
+            Method::PsaoMls => write!(f, "psao-mls"),
             Method::PsaoHat { radius: 1.0 } => write!(f, "psao-hat"),
             Method::PsaoHat { radius } => write!(f, "psao-hat-{radius}"),
             Method::Rtao { rays } => write!(f, "rtao-{rays}"),
@@ -249,6 +301,7 @@ impl FromStr for Method {
     fn from_str(s: &str) -> Result<Self, Self::Err> {
         match s {
             "psao" => Ok(Method::Psao),
+            "psao-mls" => Ok(Method::PsaoMls),
             "psao-hat" => Ok(Method::PsaoHat { radius: 1.0 }),
             "none" => Ok(Method::None),
             "rtao" => Ok(Method::Rtao { rays: 16 }),
@@ -259,7 +312,7 @@ impl FromStr for Method {
                     (Some(rays @ 1..=65536), _) => Ok(Method::Rtao { rays }),
                     (_, Some(radius)) if (0.1..=8.0).contains(&radius) => Ok(Method::PsaoHat { radius }),
                     _ => Err(
-                        "known methods: psao, psao-hat, psao-hat-F with its radius times F from 0.1 to 8, \
+                        "known methods: psao, psao-mls, psao-hat, psao-hat-F with its radius times F from 0.1 to 8, \
                               rtao-R with R from 1 to 65536 (rtao-16), none"
                             .into(),
                     ),

@@ -1,12 +1,15 @@
-//! The command `dapple`: evaluate, render, and write scenes.
+//! The command `dapple`: evaluate, render, record, and write scenes.
 
 #[macro_use]
 mod say;
 
 mod args;
 mod eval;
+mod inspect;
+mod light;
 mod picture;
 mod progress;
+mod record;
 mod render;
 mod scene_command;
 mod source;
@@ -42,7 +45,9 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     let threads = match &cli.command {
         Command::Eval(args) => args.threads,
         Command::Render(args) => args.threads,
-        Command::Scene(_) => 0,
+        Command::Record(args) => args.threads,
+        Command::Quality(args) => args.threads,
+        Command::Scene(_) | Command::Inspect(_) => 0,
     };
     if threads > 1024 {
         anyhow::bail!("--threads is {threads}, must be 0 (one for each core) to 1024");
@@ -51,6 +56,9 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     pool.install(|| match cli.command {
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
+        Command::Quality(args) => eval::quality::run(&args),
         Command::Scene(args) => scene_command::run(&args),
+        Command::Record(args) => record::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
     })
 }

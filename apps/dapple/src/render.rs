@@ -1,7 +1,7 @@
 //! `dapple render`: one picture.
 
 use anyhow::{Result, bail};
-use dapple_client::{Client, Drawn, PictureParams, draw};
+use dapple_client::{Client, Drawn, PictureParams, draw, Reconstruction};
 use dapple_render::compose::{ErrorKind, NormalSpace, PointsView, draw_points, resolve_plane, view_error};
 use dapple_render::compose::{view_normals, view_visibility};
 use dapple_render::image::{Rgb8Image, ToneMap};
@@ -88,14 +88,14 @@ fn visibility(
     loaded: &Loaded,
     drawn: &Drawn,
 ) -> Result<Option<Vec<f32>>> {
-    let kernel = match method {
+    let reconstruction = match method {
         RenderMethod::None => return Ok(None),
         RenderMethod::Rtao => return Ok(Some(traced(args, loaded, drawn)?)),
-        RenderMethod::Psao => Kernel::default(),
-        RenderMethod::PsaoHat => Kernel::Hat(Hat::default()),
+        RenderMethod::Psao => Reconstruction::Atlas,
+        RenderMethod::PsaoHat => Kernel::Hat(Hat::default()).into(),
     };
     let (_, client) = light(args, loaded)?;
-    Ok(Some(client.visibility(drawn, &kernel)))
+    Ok(Some(client.visibility(drawn, &reconstruction)))
 }
 
 fn traced(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn) -> Result<Vec<f32>> {
@@ -134,7 +134,8 @@ fn light(args: &RenderArgs, loaded: &Loaded) -> Result<(Server, Client)> {
     let bar = Bar::new("points", 1000);
     let mut server = Server::new(scene.clone(), &config, &|progress| match progress {
         Progress::Laying(done, of) => bar.set((done * 400 / of.max(1)) as u64),
-        Progress::Tracing(done, of) => bar.set((400 + done * 600 / of.max(1)) as u64),
+        Progress::Tracing(done, of) => bar.set((400 + done * 500 / of.max(1)) as u64),
+        Progress::Cutting(done, of) => bar.set((900 + done * 100 / of.max(1)) as u64),
     })?;
     server.step(args.time)?;
     let mut client = Client::new(scene.clone(), Limits::default());

@@ -134,7 +134,8 @@ impl Files for Folder {
     }
 }
 
-fn read_limited(path: &Path, limit_bytes: u64) -> std::io::Result<Vec<u8>> {
+/// Reads a whole file of at most so many bytes.
+pub(crate) fn read_limited(path: &Path, limit_bytes: u64) -> std::io::Result<Vec<u8>> {
     let file = std::fs::File::open(path)?;
     let metadata = file.metadata()?;
     if metadata.is_dir() {

@@ -6,8 +6,7 @@ mod common;
 use std::sync::Arc;
 
 use common::{config, covered, made, server, small};
-use dapple_client::{Client, Drawn};
-use dapple_render::psao::Kernel;
+use dapple_client::{Client, Drawn, Reconstruction};
 use dapple_scene::{NoFiles, PosedCamera, Scene};
 use dapple_stream::{Applied, Limits};
 
@@ -19,7 +18,7 @@ fn sheet() -> (Arc<Scene>, PosedCamera) {
 
 fn show(client: &Client, camera: &PosedCamera) -> (Drawn, Vec<f32>) {
     let drawn = client.draw(camera, 1.0, &small(64, 48)).unwrap();
-    let visibility = client.visibility(&drawn, &Kernel::default());
+    let visibility = client.visibility(&drawn, &Reconstruction::default());
     (drawn, visibility)
 }
 

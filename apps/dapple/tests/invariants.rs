@@ -6,8 +6,7 @@ mod common;
 use std::sync::Arc;
 
 use common::{atrium, config, covered, fingerprint, join, made, server, small, truth, with_threads};
-use dapple_client::Client;
-use dapple_render::psao::Kernel;
+use dapple_client::{Client, Reconstruction};
 use dapple_render::shade::Ambient;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{NoFiles, Scene};
@@ -33,7 +32,7 @@ fn record(scene: &Arc<Scene>) -> (Vec<Arc<[u8]>>, Vec<Vec3>) {
     let last_s = TIMES_S[TIMES_S.len() - 1];
     let camera = scene.camera_paths()[0].camera(scene, &scene.pose(last_s));
     let drawn = client.draw(&camera, last_s, &small(96, 54)).unwrap();
-    let visibility = client.visibility(&drawn, &Kernel::default());
+    let visibility = client.visibility(&drawn, &Reconstruction::default());
     (frames, drawn.compose(Some(&visibility)).unwrap().pixels)
 }
 
@@ -115,7 +114,7 @@ fn a_still_scene_sends_nothing_and_its_picture_stands_still() {
             assert!(report.frame.is_none(), "a frame at {time_s}");
             assert_eq!((report.changed, report.traced, report.rays), (0, 0, 0));
             let drawn = client.draw(&camera, time_s, &small(96, 54)).unwrap();
-            let visibility = client.visibility(&drawn, &Kernel::default());
+            let visibility = client.visibility(&drawn, &Reconstruction::default());
             assert!(visibility.iter().any(|&v| v < 0.9), "the picture shows occlusion");
             let picture = drawn.compose(Some(&visibility)).unwrap().pixels;
             let bits: Vec<[u32; 3]> = picture.iter().map(|p| p.to_array().map(f32::to_bits)).collect();
@@ -167,7 +166,7 @@ fn visibility_touches_neither_emission_nor_unlit_color() {
         let mut params = small(96, 72);
         params.shade.specular = specular;
         let drawn = client.draw(&camera, 0.0, &params).unwrap();
-        let visibility = client.visibility(&drawn, &Kernel::default());
+        let visibility = client.visibility(&drawn, &Reconstruction::default());
         let open = drawn.compose(None).unwrap().pixels;
         let occluded = drawn.compose(Some(&visibility)).unwrap().pixels;
         let (mut shadowed, mut darker) = (0, 0);

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use common::{config, join, server, shared, small};
-use dapple_render::psao::Kernel;
+use dapple_client::Reconstruction;
 use dapple_scene::Files;
 
 /// The files beside a scene.
@@ -47,7 +47,7 @@ fn light(path: &str, moves: bool) {
         for path in scene.camera_paths() {
             let camera = path.camera(&scene, &scene.pose(time_s));
             let drawn = client.draw(&camera, time_s, &small(64, 48)).unwrap();
-            let visibility = client.visibility(&drawn, &Kernel::default());
+            let visibility = client.visibility(&drawn, &Reconstruction::default());
             assert!(visibility.iter().all(|v| (0.0..=1.0).contains(v)), "{name}, {}", path.name);
             assert!(visibility.iter().any(|&v| v < 0.99), "{name}, {}: nothing is occluded", path.name);
             let picture = drawn.compose(Some(&visibility)).unwrap();

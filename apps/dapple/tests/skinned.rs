@@ -6,8 +6,7 @@ mod common;
 use std::sync::Arc;
 
 use common::{config, join, made, server, shared, small, truth, visibility_psnr_db};
-use dapple_client::Client;
-use dapple_render::psao::Kernel;
+use dapple_client::{Client, Reconstruction};
 use dapple_scene::{NoFiles, PosedCamera, Scene};
 use dapple_server::ServerConfig;
 use dapple_stream::{Applied, FrameKind};
@@ -44,7 +43,7 @@ fn compare(
     let drawn = client.draw(&camera(scene), time_s, &small(160, 120)).unwrap();
     let truth = truth(scene, &drawn, 256, config.update.radius_m);
     let [followed, stale] = [client, stale]
-        .map(|c| visibility_psnr_db(&drawn, &truth, &c.visibility(&drawn, &Kernel::default())));
+        .map(|c| visibility_psnr_db(&drawn, &truth, &c.visibility(&drawn, &Reconstruction::default())));
     eprintln!("{}: followed {followed:.2} dB, stale {stale:.2} dB", scene.name);
     (followed, stale)
 }

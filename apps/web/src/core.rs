@@ -92,10 +92,10 @@ impl Core {
             shade.shadow_resolution = shadow_resolution.clamp(16, 8192);
         }
         let config = ViewerConfig {
-            format: self.screen.format(),
             samples: if samples == 1 { 1 } else { 4 },
             shade,
             limits: self.limits,
+            ..ViewerConfig::new(self.screen.format())
         };
         let viewer = Viewer::new(&self.screen.gpu, Arc::clone(&scene), config)?;
         self.steering = Steering::new(&scene);
@@ -136,8 +136,8 @@ impl Core {
 
     /// Plays up to `now_s` (seconds on the page's clock) and draws if anything changed; true if it drew.
     pub fn frame(&mut self, now_s: f64) -> Result<bool, JsError> {
-        if let Some(failure) = self.screen.take_failure() {
-            return Err(JsError::new(&failure));
+        if let Some(fault) = self.screen.gpu.take_fault() {
+            return Err(fault.into());
         }
         let elapsed_s = self.last_tick_s.map_or(0.0, |last| now_s - last);
         self.last_tick_s = Some(now_s);
@@ -296,7 +296,7 @@ impl Core {
 
     fn can(&self, method: Method) -> bool {
         method != Method::PsaoPaper
-            || self.screen.gpu.device.limits().max_storage_buffers_per_shader_stage > 0
+            || self.screen.gpu.has_storage_buffers()
     }
 
     /// Width of the picture per height.

@@ -60,7 +60,7 @@ impl Steering {
         match (self.aim, self.paths.first()) {
             (Aim::Hand(controls), _) => controls.camera(self.yfov),
             (Aim::Path(index), Some(first)) => {
-                self.paths.get(index).unwrap_or(first).camera(scene, &scene.pose(time_s))
+                self.paths.get(index).unwrap_or(first).camera(scene, &scene.pose_undeformed(time_s))
             }
             (Aim::Path(_), None) => PosedCamera::look_at(Vec3::ONE, Vec3::ZERO, self.yfov),
         }

@@ -1,23 +1,25 @@
 //! The client's half: stream + render. Frames in, pictures out; no socket, no window, no clock.
 //!
 //! ```text
-//! frames ─► subscriber ─► store ─► point index ─┐
-//! pose(now), camera ─► g-buffer ─► fragments ───┴─► visibility ─► compose ─► image
+//! frames ─► subscriber ─► store ─► visibility atlas (or point index) ─┐
+//! pose(now), camera ─► g-buffer ──────────────────────────────────────┴─► visibility ─► compose ─► image
 //! ```
 
 pub mod controls;
 #[cfg(feature = "gpu")]
 pub mod viewer;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use dapple_render::RenderError;
 use dapple_render::compose::compose;
 use dapple_render::gbuffer::{GBuffer, rasterize};
 use dapple_render::image::LinearImage;
+use dapple_render::psao::atlas::{AtlasParams, PointChange, VisibilityAtlas};
 use dapple_render::psao::{Kernel, PointIndex, reconstruct};
 use dapple_render::shade::{ShadeParams, Shaded, render_shadow_maps, shade};
 use dapple_scene::{Pose, PosedCamera, Scene};
+use dapple_store::charts::Cuts;
 use dapple_store::points::PointStore;
 use dapple_stream::{Applied, Limits, ReceiveError, Subscriber};
 
@@ -25,7 +27,25 @@ use dapple_stream::{Applied, Limits, ReceiveError, Subscriber};
 pub struct Client {
     scene: Arc<Scene>,
     subscriber: Subscriber,
-    index: Option<PointIndex>,
+    /// Made when they are first needed.
+    index: OnceLock<PointIndex>,
+    atlas: OnceLock<VisibilityAtlas>,
+}
+
+/// How values of points become the visibility of a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Reconstruction {
+    /// Through the visibility atlas: resolved once where values change, read by every picture.
+    #[default]
+    Atlas,
+    /// At every sample anew, from the points around it.
+    Direct(Kernel),
+}
+
+impl From<Kernel> for Reconstruction {
+    fn from(kernel: Kernel) -> Self {
+        Reconstruction::Direct(kernel)
+    }
 }
 
 /// How a picture is made.
@@ -64,14 +84,19 @@ impl Client {
     pub fn new(scene: Arc<Scene>, mut limits: Limits) -> Client {
         limits.max_sets = limits.max_sets.max(u32::try_from(scene.instances.len()).unwrap_or(u32::MAX));
         let subscriber = Subscriber::new(Some(scene.hash().0), limits);
-        Client { scene, subscriber, index: None }
+        Client { scene, subscriber, index: OnceLock::new(), atlas: OnceLock::new() }
     }
 
     /// Takes one frame off the wire. On an error nothing has changed.
     pub fn receive(&mut self, bytes: &[u8]) -> Result<Applied, ReceiveError> {
         let applied = self.subscriber.receive(bytes)?;
-        if matches!(applied, Applied::NewLayout) {
-            self.index = self.subscriber.store().map(|store| PointIndex::new(store.layout()));
+        match (&applied, self.atlas.get_mut()) {
+            (Applied::NewLayout, _) => (self.index, self.atlas) = (OnceLock::new(), OnceLock::new()),
+            (Applied::Changes(changes), Some(atlas)) => {
+                atlas.begin_update();
+                atlas.apply(changes.iter().map(|c| PointChange { point: c.point, old: c.old, new: c.new }));
+            }
+            _ => {}
         }
         Ok(applied)
     }
@@ -79,6 +104,11 @@ impl Client {
     /// What this client holds; nothing before the first snapshot.
     pub fn store(&self) -> Option<&PointStore> {
         self.subscriber.store()
+    }
+
+    /// Which points do not count at which texels, as the server found.
+    pub fn cuts(&self) -> Option<&Cuts> {
+        self.subscriber.cuts()
     }
 
     /// Number of the update it holds.
@@ -96,15 +126,35 @@ impl Client {
         draw(&self.scene, camera, now_s, params)
     }
 
-    /// Visibility of each sample: all open before the first snapshot.
-    pub fn visibility(&self, drawn: &Drawn, kernel: &Kernel) -> Vec<f32> {
-        match (&self.index, self.subscriber.store()) {
-            (Some(index), Some(store)) => {
+    /// Visibility of each sample: all open before the first snapshot. The first call after a new layout takes
+    /// longer: it makes the atlas, or the index of the points.
+    pub fn visibility(&self, drawn: &Drawn, reconstruction: &Reconstruction) -> Vec<f32> {
+        let Some(store) = self.subscriber.store() else {
+            return vec![1.0; drawn.gbuffer.samples().len()];
+        };
+        match reconstruction {
+            Reconstruction::Atlas => self.atlas_of(store).reconstruct(&drawn.gbuffer, 1.0),
+            Reconstruction::Direct(kernel) => {
+                let index = self.index.get_or_init(|| PointIndex::new(store.layout()));
                 let fragments = drawn.gbuffer.map_surfaces_rest(&self.scene, |_, surface| surface.copied());
                 reconstruct(index, store.visibility(), kernel, &fragments)
             }
-            _ => vec![1.0; drawn.gbuffer.samples().len()],
         }
+    }
+
+    /// The atlas, complete; nothing before the first snapshot.
+    pub fn atlas(&self) -> Option<&VisibilityAtlas> {
+        self.subscriber.store().map(|store| self.atlas_of(store))
+    }
+
+    fn atlas_of(&self, store: &PointStore) -> &VisibilityAtlas {
+        self.atlas.get_or_init(|| {
+            let layout = store.layout().clone();
+            let mut atlas =
+                VisibilityAtlas::new(layout, &self.scene, self.subscriber.cuts(), AtlasParams::default());
+            while !atlas.work(&self.scene, store.visibility(), usize::MAX).is_complete() {}
+            atlas
+        })
     }
 }
 

@@ -11,11 +11,12 @@ use dapple_scene::{Pose, Scene};
 use dapple_store::points::PointStore;
 use dapple_stream::{Frame, PublishError, Publisher, PublisherConfig};
 use dapple_trace::Tracer;
+use dapple_trace::psao::cuts::find_cuts;
 use dapple_trace::psao::generate::{GenerateError, GenerateParams, GeneratedPoints, generate_points};
 use dapple_trace::psao::update::{UpdateError, UpdateParams, Updater};
 
 /// Settings of a server. Each group documents its own ranges and defaults.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ServerConfig {
     /// How points are laid.
     pub generate: GenerateParams,
@@ -23,6 +24,20 @@ pub struct ServerConfig {
     pub update: UpdateParams,
     /// How changes are grouped.
     pub publish: PublisherConfig,
+    /// Whether rays find out which points must not count at which texels of a client's atlas, because something solid stands
+    /// between them. Costs some seconds at the start and some bytes of each snapshot; light leaks less. Default true.
+    pub cuts: bool,
+}
+
+impl Default for ServerConfig {
+    fn default() -> Self {
+        ServerConfig {
+            generate: GenerateParams::default(),
+            update: UpdateParams::default(),
+            publish: PublisherConfig::default(),
+            cuts: true,
+        }
+    }
 }
 
 /// What a long start is doing, for progress bars.
@@ -32,6 +47,8 @@ pub enum Progress {
     Laying(usize, usize),
     /// Tracing every point once: points done, of how many.
     Tracing(usize, usize),
+    /// Looking for what stands between points and texels: instances done, of how many.
+    Cutting(usize, usize),
 }
 
 /// Why a server did not start or step.
@@ -98,6 +115,13 @@ impl Server {
         let tracing = |done| progress(Progress::Tracing(done, count));
         let updater = Updater::new(&scene, &pose, &tracer, points, config.update, &tracing)?;
         let mut publisher = Publisher::new(scene.hash().0, config.publish);
+        if config.cuts {
+            let layout = updater.store().layout();
+            let sets = layout.sets().len();
+            let cuts =
+                find_cuts(&scene, &pose, &tracer, layout, &|done| progress(Progress::Cutting(done, sets)));
+            publisher.set_cuts(layout.clone(), cuts);
+        }
         publisher.publish(updater.store())?;
         Ok(Server { scene, tracer, updater, publisher, dropped_inside })
     }

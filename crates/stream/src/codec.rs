@@ -2,7 +2,8 @@
 //!
 //! A snapshot is a layout and one value a point. Points are in Morton order, so a position is the distance of
 //! its cell from the previous point's cell and the place within the cell; of that place one coordinate follows
-//! nearly from the other two, because points lie on surfaces whose normals are known ([`plane`]). A delta is
+//! nearly from the other two, because points lie on surfaces whose normals are known ([`plane`]). With the layout come
+//! the cuts: which points do not count at which texels. A delta is
 //! gaps between changed points and the differences from the values the receiver holds.
 
 mod decode;
@@ -22,7 +23,7 @@ pub use frame::{FrameHeader, FrameKind, MAGIC, VERSION, seal};
 use dapple_store::points::LayoutError;
 
 /// What a receiver is willing to take. Every allocation of a decoder is bounded by these, whatever the bytes say:
-/// at most 64 bytes for each of `max_points`, 256 for each of `max_sets`, and 8 MiB.
+/// at most 64 bytes for each of `max_points`, 256 for each of `max_sets`, 32 for each of `max_cuts`, and 8 MiB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Longest frame, bytes. Default 64 MiB.
@@ -32,11 +33,13 @@ pub struct Limits {
     pub max_points: u32,
     /// Most sets (instances with points) of a layout. Default 65,536.
     pub max_sets: u32,
+    /// Most texels of which points are cut. Default 2²¹ (2 million; a building of 4 million points has about a tenth).
+    pub max_cuts: u32,
 }
 
 impl Default for Limits {
     fn default() -> Limits {
-        Limits { max_frame_bytes: 64 << 20, max_points: 1 << 22, max_sets: 1 << 16 }
+        Limits { max_frame_bytes: 64 << 20, max_points: 1 << 22, max_sets: 1 << 16, max_cuts: 1 << 21 }
     }
 }
 

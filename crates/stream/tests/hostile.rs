@@ -7,6 +7,7 @@ mod cloud;
 
 use std::sync::LazyLock;
 
+use dapple_store::charts::{Cuts, SetCuts, SiteCut};
 use dapple_store::points::PointStore;
 use dapple_stream::codec::seal;
 use dapple_stream::{
@@ -19,6 +20,7 @@ use proptest::prelude::*;
 static SAMPLE: LazyLock<(PointStore, Vec<u8>, Vec<u8>)> = LazyLock::new(|| {
     let store = cloud::hall(3, 3000);
     let mut publisher = Publisher::new([1; 32], PublisherConfig::default());
+    publisher.set_cuts(store.layout().clone(), cuts());
     for seed in 0..10 {
         publisher.publish(&cloud::moved(&store, seed, 0.01)).unwrap();
     }
@@ -28,6 +30,15 @@ static SAMPLE: LazyLock<(PointStore, Vec<u8>, Vec<u8>)> = LazyLock::new(|| {
     let delta = publisher.publish(&cloud::moved(&store, 4, 0.1)).unwrap().unwrap();
     (store, snapshot.bytes.to_vec(), delta.bytes.to_vec())
 });
+
+/// Enough cuts in two sets that their sections are compressed.
+fn cuts() -> Cuts {
+    let set = |instance, count: u32| {
+        let cut = |i| SiteCut { site: i * 3 + i % 2, mask: 1 << (i % 16) | 1 };
+        SetCuts { instance, sites: 3 * count + 1, fingerprint: 77, cuts: (0..count).map(cut).collect() }
+    };
+    Cuts::new(vec![set(0, 500), set(2, 100)]).unwrap()
+}
 
 fn payload(frame: &[u8]) -> Vec<u8> {
     let header = FrameHeader::parse(frame, &Limits::default()).unwrap();
@@ -114,11 +125,12 @@ fn every_cut_of_a_frame_is_named_so() {
 fn limits_hold() {
     let points = SAMPLE.0.layout().len() as u32;
     let sets = SAMPLE.0.layout().sets().len() as u32;
-    let exact = Limits { max_points: points, max_sets: sets, max_frame_bytes: SAMPLE.1.len() };
+    let exact = Limits { max_points: points, max_sets: sets, max_frame_bytes: SAMPLE.1.len(), max_cuts: 600 };
     assert_eq!(Subscriber::new(None, exact).receive(&SAMPLE.1), Ok(Applied::NewLayout));
     for limits in [
         Limits { max_points: points - 1, ..exact },
         Limits { max_sets: sets - 1, ..exact },
+        Limits { max_cuts: 599, ..exact },
         Limits { max_frame_bytes: SAMPLE.1.len() - 1, ..exact },
     ] {
         let error = Subscriber::new(None, limits).receive(&SAMPLE.1).unwrap_err();
@@ -137,6 +149,7 @@ fn rules_of_the_format_are_enforced() {
         out.extend([0, 1, 0]);
         out.extend([0; 12]);
         out.extend([1, 2, normal, 2, 0, 2, cell, 2, local, 2, 0, 2, 0]);
+        out.extend([0, 0, 0, 0]);
         out
     };
     let snapshot = |layout: Vec<u8>, values: &[u8]| {
@@ -167,12 +180,31 @@ fn rules_of_the_format_are_enforced() {
         out.extend([2, 0, 2, 0, 14]);
         out.extend(cell);
         out.extend([2, 0, 2, 0, 2, 0]);
+        out.extend([0, 0, 0, 0]);
         out
     };
     let last = [0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x3f];
     assert_eq!(snapshot(with_cell(last), &[2, 0]), Ok(Applied::NewLayout));
     let beyond = [0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x40];
     assert!(reason(snapshot(with_cell(beyond), &[2, 0])).contains("leave the 21-bit grid"));
+
+    // One site of ten is cut.
+    let with_cuts = |cuts: &[u8]| {
+        let mut out = layout(53, 0, 0);
+        out.truncate(out.len() - 4);
+        out.extend(cuts);
+        snapshot(out, &[2, 0])
+    };
+    assert_eq!(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 1, 2, 9, 2, 1, 2, 0]), Ok(Applied::NewLayout));
+    assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 1, 2, 10, 2, 1, 2, 0])).contains("does not exist"));
+    assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 1, 2, 9, 2, 0, 2, 0])).contains("cuts nothing"));
+    assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 0, 0, 0, 0])).contains("a set has none"));
+    assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 1, 4, 9, 0, 2, 1, 2, 0])).contains("more than there are cuts"));
+    assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9])).contains("ends early"));
+    assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 1, 2, 9, 2, 1])).contains("ends early"));
+    let over = [0x80, 0x80, 0x80, 0x80, 0x10];
+    assert!(reason(with_cuts(&[&[1][..], &over, &[10, 9, 9, 9, 9, 1]].concat())).contains("exceeds 32 bits"));
+    assert!(reason(with_cuts(&[&[1, 0][..], &over, &[9, 9, 9, 9, 1]].concat())).contains("exceed 32 bits"));
 
     let delta = |payload: &[u8]| holding().receive(&seal(FrameKind::Delta, 0, 12, payload));
     assert!(matches!(delta(&[2, 1, 2, 5, 2, 9]), Ok(Applied::Changes(list)) if list.len() == 1));

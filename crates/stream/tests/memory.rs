@@ -40,9 +40,18 @@ fn claim(points: u64, sections: &[u8]) -> Vec<u8> {
     out
 }
 
-/// A compressed section of `raw` zeros, and what Zstandard makes of them.
+/// A compressed section that claims some bytes and expands to `real` zeros.
 fn zeros(claimed: u64, real: usize) -> Vec<u8> {
-    let coded = zstd::bulk::compress(&vec![0; real], 19).expect("compresses");
+    compressed(claimed, &vec![0; real])
+}
+
+/// A compressed section of equal bytes.
+fn repeated(byte: u8, count: usize) -> Vec<u8> {
+    compressed(count as u64, &vec![byte; count])
+}
+
+fn compressed(claimed: u64, raw: &[u8]) -> Vec<u8> {
+    let coded = zstd::bulk::compress(raw, 19).expect("compresses");
     let mut out = Vec::new();
     varint(&mut out, (coded.len() as u64 - 4) << 1 | 1);
     varint(&mut out, claimed);
@@ -96,13 +105,32 @@ fn memory_is_bounded_whatever_the_bytes_claim() {
         sections.extend(zeros(points, points as usize));
     }
     let small = Limits { max_points: points as u32, ..Limits::default() };
-    let mut payload = claim(points, &sections);
+    let no_cuts = [0; 4];
+    let mut payload = claim(points, &[&sections[..], &no_cuts].concat());
     payload.extend(zeros(points, points as usize));
     assert!(payload.len() < 1000, "{} bytes", payload.len());
     let (peak, result) = peak_bytes(small, &payload);
     let bound = 64 * points as usize + 256 * small.max_sets as usize + 8 * MIB;
     assert!(result.is_ok() && peak <= bound, "{peak} bytes, bound {bound}: {result:?}");
     println!("a million points: {peak} bytes from {}", payload.len());
+    // The same with as many cuts as are taken, then one more.
+    for (cuts, sound) in [(u64::from(small.max_cuts), true), (u64::from(small.max_cuts) + 1, false)] {
+        let mut with_cuts = sections.clone();
+        with_cuts.extend([1, 0]);
+        varint(&mut with_cuts, cuts);
+        with_cuts.extend([9; 4]);
+        varint(&mut with_cuts, cuts);
+        with_cuts.extend(zeros(cuts, cuts as usize));
+        with_cuts.extend(repeated(1, cuts as usize));
+        with_cuts.extend(zeros(cuts, cuts as usize));
+        let mut payload = claim(points, &with_cuts);
+        payload.extend(zeros(points, points as usize));
+        assert!(payload.len() < 2000, "{} bytes", payload.len());
+        let (peak, result) = peak_bytes(small, &payload);
+        let bound = bound + 32 * small.max_cuts as usize;
+        assert!(result.is_ok() == sound && peak <= bound, "{peak} bytes, bound {bound}: {result:?}");
+        println!("{cuts} cuts: {peak} bytes from {}", payload.len());
+    }
     // The longest gaps that are allowed, at first sight.
     let mut sections = [zeros(points, points as usize), zeros(points, points as usize)].concat();
     sections.extend(zeros(9 * points, 9 * points as usize));

@@ -4,6 +4,7 @@
 
 mod common;
 
+use dapple_store::charts::{Cuts, SetCuts, SiteCut};
 use dapple_store::points::{Change, PointLayout, PointStore};
 use dapple_stream::{Applied, FrameHeader, Limits, Publisher, PublisherConfig, Subscriber, ValueChange};
 
@@ -46,6 +47,12 @@ fn described() -> PointStore {
     PointStore::new(layout.into(), vec![255, 250, 128, 0, 64]).unwrap()
 }
 
+/// The cuts that the document describes.
+fn cuts() -> Cuts {
+    let cuts = vec![SiteCut { site: 3, mask: 0x0005 }, SiteCut { site: 8, mask: 0x8002 }];
+    Cuts::new(vec![SetCuts { instance: 0, sites: 9, fingerprint: 0x0123_4567, cuts }]).unwrap()
+}
+
 fn changes() -> [Change; 2] {
     [Change { point: 1, visibility: 240 }, Change { point: 4, visibility: 70 }]
 }
@@ -60,6 +67,7 @@ fn the_vectors_decode_to_what_is_described() {
     assert_eq!(subscriber.receive(&vector("snapshot")), Ok(Applied::NewLayout));
     let mut expected = described();
     assert!(common::same_bits(subscriber.store().unwrap(), &expected));
+    assert_eq!(subscriber.cuts(), Some(&cuts()));
     assert_eq!((subscriber.group(), subscriber.epoch()), (Some(300), Some(5)));
 
     let list = vec![ValueChange { point: 1, old: 250, new: 240 }, ValueChange { point: 4, old: 64, new: 70 }];
@@ -74,6 +82,7 @@ fn encoding_gives_the_vectors() {
     let config = PublisherConfig { first_group: 300, deltas_per_group: 0 };
     let mut publisher = Publisher::new(scene_hash(), config);
     let mut store = described();
+    publisher.set_cuts(store.layout().clone(), cuts());
     // Epochs 0 to 4 show other values; a joiner at epoch 5 gets the snapshot.
     for value in 0..5 {
         publisher.publish(&PointStore::new(store.layout().clone(), vec![value; 5]).unwrap()).unwrap();

@@ -1,4 +1,6 @@
-//! Points that carry visibility: where they lie ([Neff2023] sec. 3.1) and what is traced again (sec. 3.3).
+//! Points that carry visibility: where they lie ([Neff2023] sec. 3.1) what is traced again (sec. 3.3), and what stands between
+//! a point and a texel that it would count at.
 
+pub mod cuts;
 pub mod generate;
 pub mod update;

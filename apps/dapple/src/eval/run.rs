@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use dapple_client::{Client, Drawn, PictureParams, draw};
+use dapple_client::{Client, Drawn, PictureParams, Reconstruction, draw};
 use dapple_render::psao::{Hat, Kernel};
 use dapple_scene::Pose;
 use dapple_server::{Progress, Server, ServerConfig};
@@ -249,10 +249,13 @@ impl Line {
     ) -> Result<()> {
         let start = Instant::now();
         let visibility = match (self.method, self.pair) {
-            (Method::Psao, Some(pair)) => Some(pairs[pair].client.visibility(drawn, &Kernel::default())),
+            (Method::Psao, Some(pair)) => Some(pairs[pair].client.visibility(drawn, &Reconstruction::Atlas)),
+            (Method::PsaoMls, Some(pair)) => {
+                Some(pairs[pair].client.visibility(drawn, &Kernel::default().into()))
+            }
             (Method::PsaoHat { radius }, Some(pair)) => {
                 let hat = Hat { radius, ..Hat::default() };
-                Some(pairs[pair].client.visibility(drawn, &Kernel::Hat(hat)))
+                Some(pairs[pair].client.visibility(drawn, &Kernel::Hat(hat).into()))
             }
             (Method::Rtao { rays }, _) => {
                 let rays = settings.rays_per_sample(rays);

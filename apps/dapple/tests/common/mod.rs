@@ -104,3 +104,10 @@ pub(crate) fn shared(path: &str) -> Option<PathBuf> {
     }
     Some(found)
 }
+
+/// Mean squared error of visibility over the samples that show a surface.
+pub(crate) fn mean_squared_error(drawn: &Drawn, truth: &[f32], test: &[f32]) -> f64 {
+    let pairs = covered(drawn).into_iter().zip(truth.iter().zip(test)).filter(|(covered, _)| *covered);
+    let squares: Vec<f64> = pairs.map(|(_, (a, b))| f64::from(a - b) * f64::from(a - b)).collect();
+    squares.iter().sum::<f64>() / squares.len().max(1) as f64
+}

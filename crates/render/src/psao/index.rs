@@ -1,5 +1,6 @@
 //! Finds the points near a fragment.
 
+use dapple_store::charts::Weighed;
 use dapple_store::points::{CellGrid, PointLayout};
 use glam::Vec3;
 
@@ -118,6 +119,8 @@ pub(super) struct Near {
     key: Option<(usize, [i32; 3], i32)>,
     indices: Vec<u32>,
     pub(super) points: Vec<NearPoint>,
+    /// What least squares makes of them, with their values.
+    pub(super) weighed: Vec<(Weighed, f32)>,
 }
 
 #[derive(Clone, Copy, Debug)]

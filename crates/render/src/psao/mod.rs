@@ -2,9 +2,13 @@
 //!
 //! Takes the store's points and fragments in rest space; returns one visibility a fragment. See `README.md`.
 
+pub mod atlas;
+pub mod cells;
 mod hat;
+pub mod hash;
 mod index;
 mod mls;
+mod tables;
 #[cfg(test)]
 mod tests;
 
@@ -12,9 +16,12 @@ use rayon::prelude::*;
 
 use crate::gbuffer::RestSurface;
 
+pub use dapple_store::charts::MovingLeastSquares;
 pub use hat::Hat;
 pub use index::PointIndex;
-pub use mls::MovingLeastSquares;
+#[cfg(feature = "gpu")]
+pub use tables::TableTextures;
+pub use tables::{TABLE_WIDTH, TableError};
 
 /// How values of points near a fragment become its visibility.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,7 +58,9 @@ pub fn reconstruct(
             chunk.iter().map(move |fragment| match (fragment, kernel) {
                 (None, _) => 1.0,
                 (Some(f), Kernel::Hat(hat)) => hat.visibility(index, visibility, f, &mut near),
-                (Some(f), Kernel::MovingLeastSquares(mls)) => mls.visibility(index, visibility, f, &mut near),
+                (Some(f), Kernel::MovingLeastSquares(kernel)) => {
+                    mls::visibility(kernel, index, visibility, f, &mut near)
+                }
             })
         })
         .collect()

@@ -4,6 +4,30 @@
 //! charts of one instance; an *atlas* is where the pages of all instances are placed. A *site* is a texel with the place
 //! on the surface that it stands for.
 
+mod atlas;
+mod build;
+mod cuts;
+mod flatten;
+mod grow;
+mod kernel;
+mod neighbours;
+mod pack;
+mod per_vertex;
+mod plan;
+mod raster;
 mod set;
+mod surface;
+#[cfg(test)]
+mod tests;
+mod weights;
 
-pub use set::{ChartError, ChartParams, ChartSet, ChartUv, ChartVertices, PageSize, Site, TEXEL_FRACTION};
+pub use atlas::{Atlas, AtlasError, Placement};
+pub use cuts::{Cuts, CutsError, SetCuts, SiteCut, fingerprint};
+pub use kernel::{Fit, MovingLeastSquares, Weighed};
+pub use plan::{InstanceKey, SceneCharts};
+pub use set::{
+    ChartError, ChartParams, ChartSet, ChartUv, ChartVertices, MOST_TEXELS, PageSize, Site, TEXEL_FRACTION,
+};
+pub use weights::{
+    Candidate, MAX_CANDIDATES, MAX_WEIGHTS, PointNeighbours, TexelWeights, WEIGHT_SUM, Weigher, WeightParams,
+};

@@ -1,5 +1,6 @@
 //! Payloads → layouts, values and changes. Total: any bytes give a value or an error, within [`Limits`].
 
+use dapple_store::charts::{Cuts, SetCuts, SiteCut};
 use dapple_store::points::{MAX_POINTS, PackedNormal, PointLayout, PointSet, morton_decode};
 use glam::Vec3;
 
@@ -10,6 +11,9 @@ use super::{DecodeError, Limits, unzigzag};
 
 /// Most bytes of a varint below 2⁶³.
 const MAX_GAP_BYTES: usize = 9;
+
+/// Most bytes of a varint below 2³².
+const MAX_SITE_GAP_BYTES: usize = 5;
 
 /// Most bytes of a varint below 2²⁴.
 const MAX_POINT_GAP_BYTES: usize = 4;
@@ -36,7 +40,7 @@ pub(crate) fn parse_snapshot(payload: &[u8]) -> Result<SnapshotParts<'_>, Decode
     Ok(SnapshotParts { scene_hash, layout, values })
 }
 
-pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<PointLayout, DecodeError> {
+pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<(PointLayout, Cuts), DecodeError> {
     let bad = |part, reason| DecodeError::Malformed { part, reason };
     let mut reader = Reader::new(bytes);
     let quantum_m = reader.f32("layout lengths")?;
@@ -54,6 +58,7 @@ pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<PointLayout
     let along_0 = unpack(&mut reader, "coordinates", total, total)?;
     let along_1 = unpack(&mut reader, "coordinates", total, total)?;
     let across = unpack(&mut reader, "coordinates", total, total)?;
+    let cuts = decode_cuts(&mut reader, limits)?;
     if !reader.is_empty() {
         return Err(bad("layout", "has bytes after its last section"));
     }
@@ -96,7 +101,67 @@ pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<PointLayout
     if !gaps.is_empty() {
         return Err(bad("cell gaps", "are more than there are points"));
     }
-    Ok(PointLayout::new(quantum_m, spacing_m, sets)?)
+    Ok((PointLayout::new(quantum_m, spacing_m, sets)?, cuts))
+}
+
+/// The cuts that close a layout.
+fn decode_cuts(reader: &mut Reader<'_>, limits: &Limits) -> Result<Cuts, DecodeError> {
+    let part = "cuts";
+    let bad = |reason| DecodeError::Malformed { part, reason };
+    let count = reader.varint(part)?;
+    if count > u64::from(limits.max_sets) {
+        return Err(DecodeError::TooLarge {
+            what: "sets of cuts",
+            value: count,
+            limit: limits.max_sets.into(),
+        });
+    }
+    let mut sets = Vec::new();
+    let mut counts = Vec::new();
+    let mut next_instance = 0u64;
+    let mut total = 0u64;
+    for _ in 0..count {
+        let instance = reader.varint(part)?.saturating_add(next_instance);
+        next_instance = instance.saturating_add(1);
+        let instance = u32::try_from(instance).map_err(|_| bad("an instance exceeds 32 bits"))?;
+        let sites = u32::try_from(reader.varint(part)?).map_err(|_| bad("sites exceed 32 bits"))?;
+        let fingerprint = u32::from_le_bytes(reader.array(part)?);
+        let cuts = reader.varint(part)?;
+        if cuts == 0 {
+            return Err(bad("a set has none"));
+        }
+        total = total.saturating_add(cuts);
+        if total > u64::from(limits.max_cuts) {
+            return Err(DecodeError::TooLarge { what: part, value: total, limit: limits.max_cuts.into() });
+        }
+        counts.push(cuts as usize);
+        sets.push(SetCuts { instance, sites, fingerprint, cuts: Vec::new() });
+    }
+    let total = total as usize;
+    let gaps = unpack(reader, "cut gaps", total, MAX_SITE_GAP_BYTES * total)?;
+    let low = unpack(reader, "cut masks", total, total)?;
+    let high = unpack(reader, "cut masks", total, total)?;
+    let mut gaps = Reader::new(&gaps);
+    let mut masks = low.iter().zip(&high).map(|(&low, &high)| u16::from_le_bytes([low, high]));
+    for (set, count) in sets.iter_mut().zip(counts) {
+        set.cuts = Vec::with_capacity(count);
+        let mut next = 0u64;
+        for mask in masks.by_ref().take(count) {
+            let site = next.saturating_add(gaps.varint("cut gaps")?);
+            if site >= u64::from(set.sites) {
+                return Err(DecodeError::Malformed {
+                    part: "cut gaps",
+                    reason: "name a site that does not exist",
+                });
+            }
+            next = site + 1;
+            set.cuts.push(SiteCut { site: site as u32, mask });
+        }
+    }
+    if !gaps.is_empty() {
+        return Err(DecodeError::Malformed { part: "cut gaps", reason: "are more than there are cuts" });
+    }
+    Cuts::new(sets).map_err(|error| bad(error.reason))
 }
 
 /// The table of sets, still without points, and how many points each has: together within the limits.

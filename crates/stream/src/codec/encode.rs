@@ -1,5 +1,6 @@
 //! Stores and changes → payloads. Deterministic: the same input gives the same bytes.
 
+use dapple_store::charts::Cuts;
 use dapple_store::points::{PointLayout, morton_code};
 
 use super::plane::{Plane, reference};
@@ -16,8 +17,8 @@ const DELTA_LEVEL: i32 = 1;
 /// Most bits of a coordinate within its cell: they are coded as one byte.
 const MAX_LOCAL_BITS: u32 = 8;
 
-/// The layout part of a snapshot.
-pub(crate) fn encode_layout(layout: &PointLayout) -> Result<Vec<u8>, std::io::Error> {
+/// The layout part of a snapshot, with the cuts that belong to it.
+pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts) -> Result<Vec<u8>, std::io::Error> {
     let local_bits = local_bits(layout);
     let local_mask = (1u32 << local_bits) - 1;
     let mut out = Vec::new();
@@ -60,7 +61,36 @@ pub(crate) fn encode_layout(layout: &PointLayout) -> Result<Vec<u8>, std::io::Er
     for section in [n0, n1, &cell_gaps, l0, l1, l2] {
         pack(&mut out, section, SNAPSHOT_LEVEL)?;
     }
+    encode_cuts(&mut out, cuts)?;
     Ok(out)
+}
+
+fn encode_cuts(out: &mut Vec<u8>, cuts: &Cuts) -> Result<(), std::io::Error> {
+    let sets = || cuts.sets().iter().filter(|set| !set.cuts.is_empty());
+    write_varint(out, sets().count() as u64);
+    let mut next_instance = 0;
+    let mut gaps = Vec::new();
+    let mut masks = [Vec::new(), Vec::new()];
+    for set in sets() {
+        write_varint(out, u64::from(set.instance) - next_instance);
+        next_instance = u64::from(set.instance) + 1;
+        write_varint(out, u64::from(set.sites));
+        out.extend(set.fingerprint.to_le_bytes());
+        write_varint(out, set.cuts.len() as u64);
+        let mut next = 0;
+        for cut in &set.cuts {
+            write_varint(&mut gaps, u64::from(cut.site - next));
+            next = cut.site + 1;
+            for (column, byte) in masks.iter_mut().zip(cut.mask.to_le_bytes()) {
+                column.push(byte);
+            }
+        }
+    }
+    let [low, high] = &masks;
+    for section in [&gaps, low, high] {
+        pack(out, section, SNAPSHOT_LEVEL)?;
+    }
+    Ok(())
 }
 
 /// The payload of a snapshot; `layout` is what [`encode_layout`] gave for the layout of `visibility`.

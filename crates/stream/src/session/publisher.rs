@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
+use dapple_store::charts::Cuts;
 use dapple_store::points::{PointLayout, PointStore};
 
 use crate::codec::{FrameKind, delta_payload, encode_layout, seal, snapshot_payload};
@@ -50,6 +51,8 @@ pub struct Publisher {
     config: PublisherConfig,
     next_epoch: u64,
     state: Option<State>,
+    /// For layouts that are yet to come.
+    cuts: Option<(Arc<PointLayout>, Cuts)>,
 }
 
 /// What subscribers that are up to date hold.
@@ -69,7 +72,13 @@ struct State {
 impl Publisher {
     /// A publisher of the scene with this hash. Nothing is sent before the first [`Publisher::publish`].
     pub fn new(scene_hash: [u8; 32], config: PublisherConfig) -> Publisher {
-        Publisher { scene_hash, config, next_epoch: 0, state: None }
+        Publisher { scene_hash, config, next_epoch: 0, state: None, cuts: None }
+    }
+
+    /// Gives the cuts of a layout that is to be published next: they go out with its snapshots. Without them a layout
+    /// has none. A layout that has been published keeps what it has.
+    pub fn set_cuts(&mut self, layout: Arc<PointLayout>, cuts: Cuts) {
+        self.cuts = Some((layout, cuts));
     }
 
     /// Publishes the state of the next epoch; epochs count the calls, from 0. Gives the frame for subscribers
@@ -97,11 +106,14 @@ impl Publisher {
                 }
             }
             old => {
+                let given = self.cuts.as_ref().filter(|(layout, _)| same_layout(layout, store.layout()));
+                let none = Cuts::default();
+                let layout_bytes = encode_layout(store.layout(), given.map_or(&none, |(_, cuts)| cuts))?;
                 let group =
                     old.as_ref().map_or(self.config.first_group.min(u64::MAX >> 1), |state| state.group + 1);
                 let state = State {
                     layout: store.layout().clone(),
-                    layout_bytes: encode_layout(store.layout())?,
+                    layout_bytes,
                     visibility: store.visibility().to_vec(),
                     group,
                     epoch,
@@ -110,6 +122,7 @@ impl Publisher {
                 };
                 let frame = state.snapshot(&self.scene_hash)?;
                 *old = Some(state);
+                self.cuts = None;
                 Some(frame)
             }
         };

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use dapple_store::charts::Cuts;
 use dapple_store::points::{Change, PointLayout, PointStore, StoreError};
 
 use crate::codec::{
@@ -107,6 +108,7 @@ struct State {
     scene_hash: [u8; 32],
     /// The layout as it came, to know it again in the next snapshot without decoding it.
     layout_bytes: Vec<u8>,
+    cuts: Cuts,
     store: PointStore,
 }
 
@@ -132,6 +134,11 @@ impl Subscriber {
     /// What is held, if anything yet.
     pub fn store(&self) -> Option<&PointStore> {
         self.state.as_ref().map(|state| &state.store)
+    }
+
+    /// Which points do not count at which texels, with the layout that is held. Empty where the publisher sends none.
+    pub fn cuts(&self) -> Option<&Cuts> {
+        self.state.as_ref().map(|state| &state.cuts)
     }
 
     /// Group of the state that is held.
@@ -183,13 +190,15 @@ impl Subscriber {
             (state.group, state.epoch) = (header.group, header.epoch);
             return Ok(Applied::Changes(changes));
         }
-        let layout = Arc::new(decode_layout(parts.layout, &self.limits)?);
+        let (layout, cuts) = decode_layout(parts.layout, &self.limits)?;
+        let layout = Arc::new(layout);
         let values = decode_values(parts.values, layout.len())?;
         self.state = Some(State {
             group: header.group,
             epoch: header.epoch,
             scene_hash: parts.scene_hash,
             layout_bytes: parts.layout.to_vec(),
+            cuts,
             store: new_store(layout, values)?,
         });
         Ok(Applied::NewLayout)

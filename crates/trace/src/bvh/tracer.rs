@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dapple_scene::glam::{Mat3, Vec3};
+use dapple_scene::glam::{Affine3A, Mat3, Vec3};
 use dapple_scene::{Aabb, Pose, PosedInstance, Scene};
 use rayon::prelude::*;
 
@@ -185,6 +185,45 @@ impl Tracer {
             *placed = Some(PlacedBvh { bvh, deformed, placement, bounds_world });
         });
 
+        self.build_top();
+    }
+
+    /// The same instances without those that `keeps` refuses.
+    pub(crate) fn only(&self, keeps: impl Fn(usize) -> bool) -> Tracer {
+        let mut tracer = self.clone();
+        for (index, placed) in tracer.instances.iter_mut().enumerate() {
+            if !keeps(index) {
+                *placed = None;
+            }
+        }
+        tracer.build_top();
+        tracer
+    }
+
+    /// One instance alone, at rest: its rest space takes the world's place.
+    pub(crate) fn resting(&self, scene: &Scene, instance: usize) -> Tracer {
+        let mut tracer = self.clone();
+        tracer.instances.fill(None);
+        let placed = &scene.instances[instance];
+        let mesh_index = placed.mesh as usize;
+        let mesh = &scene.meshes[mesh_index];
+        if placed.casts && !mesh.triangles.is_empty() {
+            let alpha = &self.mesh_alpha[mesh_index];
+            let bvh = self.rigid[mesh_index]
+                .clone()
+                .unwrap_or_else(|| Arc::new(MeshBvh::new(mesh, &mesh.positions, Arc::clone(alpha))));
+            let posed =
+                PosedInstance { world_from_mesh: Affine3A::from_mat3(placed.rest_from_mesh), deformed: None };
+            tracer.instances[instance] = Placement::new(&posed).map(|placement| {
+                let bounds_world = bounds_world(&bvh, &posed);
+                PlacedBvh { bvh, deformed: false, placement, bounds_world }
+            });
+        }
+        tracer.build_top();
+        tracer
+    }
+
+    fn build_top(&mut self) {
         let (indices, boxes): (Vec<u32>, Vec<Aabb>) = (0_u32..)
             .zip(&self.instances)
             .filter_map(|(i, placed)| placed.as_ref().map(|p| (i, p.bounds_world)))

@@ -1,0 +1,408 @@
+//! The visibility atlas: points resolved into texels of rest-space charts by fixed weights, exactly, where values change.
+//!
+//! Takes a layout, a scene, the values of the points and their changes; gives texels `[old, new]` in layers, which a
+//! fragment reads once, bilinearly. See `README.md`.
+
+mod pages;
+mod resolve;
+#[cfg(test)]
+mod tests;
+mod twin;
+mod upload;
+
+use std::sync::Arc;
+
+use dapple_scene::Scene;
+use dapple_store::charts::{
+    AtlasError, ChartError, ChartParams, ChartSet, Cuts, InstanceKey, PointNeighbours, WeightParams,
+};
+use dapple_store::points::PointLayout;
+
+pub use pages::{DirtyBand, Placement};
+use pages::{Pages, PlacedPages};
+use resolve::{Builder, PointTexels, Sums, add_values};
+pub use upload::TexelInfo;
+
+/// How an atlas is made. Cuts fit only the default texel sizes and kernel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AtlasParams {
+    /// How the points of a texel are chosen and weighed.
+    pub weights: WeightParams,
+    /// Factor on the edge of texels, > 0. Default 1: [`ChartParams::for_spacing`].
+    pub texel_factor: f32,
+}
+
+impl Default for AtlasParams {
+    fn default() -> Self {
+        AtlasParams { weights: WeightParams::default(), texel_factor: 1.0 }
+    }
+}
+
+/// How far an atlas is, in texels of work.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Progress {
+    /// Done.
+    pub done: u64,
+    /// Of how many; partly an estimate until `done` reaches it.
+    pub total: u64,
+}
+
+impl Progress {
+    /// Whether nothing is left to do.
+    pub fn is_complete(&self) -> bool {
+        self.done >= self.total
+    }
+}
+
+/// A point whose value changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PointChange {
+    /// Index of the point in the store.
+    pub point: u32,
+    /// Visibility before, 255 = open.
+    pub old: u8,
+    /// Visibility now.
+    pub new: u8,
+}
+
+/// The texels of all instances and what they are made of.
+pub struct VisibilityAtlas {
+    layout: Arc<PointLayout>,
+    cuts: Option<Cuts>,
+    params: AtlasParams,
+    /// Parallel to the layout's sets.
+    sets: Vec<SetState>,
+    moves: Vec<bool>,
+    /// Sets still to be made, the next one last.
+    queue: Vec<usize>,
+    job: Option<Job>,
+    done: u64,
+    pages: Pages,
+    /// Instances that became ready since they were last asked for.
+    ready: Vec<u32>,
+    /// Sets whose texels still fade in from open.
+    fresh: Vec<usize>,
+    /// Texels whose two values may differ.
+    fading: Vec<u32>,
+    failed: Vec<(u32, BuildError)>,
+}
+
+/// Why an instance cannot be shown with its visibility.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BuildError {
+    /// Its mesh cannot be cut into charts.
+    #[error(transparent)]
+    Charts(#[from] ChartError),
+    /// There is no room for its texels.
+    #[error(transparent)]
+    Atlas(#[from] AtlasError),
+}
+
+enum SetState {
+    /// Not made yet, or it cannot be: open.
+    Open,
+    Ready(Box<ReadySet>),
+}
+
+struct ReadySet {
+    charts: Arc<ChartSet>,
+    charts_key: InstanceKey,
+    table: PointTexels,
+    sums: Sums,
+    placements: Vec<Placement>,
+    placed: PlacedPages,
+}
+
+/// The set that is being made.
+struct Job {
+    set: usize,
+    charts: Arc<ChartSet>,
+    charts_key: InstanceKey,
+    stage: Stage,
+}
+
+enum Stage {
+    Sites,
+    Weigh(Box<Builder>),
+    Encode(Box<Builder>),
+    /// Points before `next` are in the sums.
+    Sum {
+        table: PointTexels,
+        sums: Sums,
+        next: usize,
+    },
+}
+
+/// Texels of work that other steps are worth, in parts of a weighed texel.
+const TRIANGLES_A_TEXEL: usize = 2;
+const ENCODED_A_TEXEL: usize = 16;
+const SUMMED_A_TEXEL: usize = 16;
+
+impl VisibilityAtlas {
+    /// An atlas in which everything is still open. `scene` must be the one that the layout was made for; `cuts` are left
+    /// out where they do not fit its charts.
+    pub fn new(
+        layout: Arc<PointLayout>,
+        scene: &Scene,
+        cuts: Option<&Cuts>,
+        params: AtlasParams,
+    ) -> VisibilityAtlas {
+        let sets = layout.sets();
+        let mut queue: Vec<usize> = (0..sets.len())
+            .filter(|&i| !sets[i].is_empty() && scene.instances.get(sets[i].instance as usize).is_some())
+            .collect();
+        // The largest last, where it is taken from first.
+        queue.sort_by_key(|&i| (sets[i].len(), std::cmp::Reverse(i)));
+        let pages = Pages::for_points(layout.len());
+        VisibilityAtlas {
+            cuts: cuts.cloned(),
+            params,
+            sets: sets.iter().map(|_| SetState::Open).collect(),
+            moves: scene.moving_instances(),
+            queue,
+            job: None,
+            done: 0,
+            pages,
+            ready: Vec::new(),
+            fresh: Vec::new(),
+            fading: Vec::new(),
+            failed: Vec::new(),
+            layout,
+        }
+    }
+
+    /// Goes on making charts and weights, about `texels` texels of it, in parallel in the caller's rayon pool. Call it with
+    /// the same `scene` and the present `visibility` (one value a point) until it is complete; changes may be
+    /// applied in between. How the work is cut in pieces does not change what comes out.
+    ///
+    /// An instance appears at once when all of it is ready, and fades in from open.
+    ///
+    /// # Panics
+    /// If `visibility` has another length than the layout.
+    pub fn work(&mut self, scene: &Scene, visibility: &[u8], texels: usize) -> Progress {
+        assert_eq!(visibility.len(), self.layout.len(), "one value a point");
+        let mut budget = texels.max(1);
+        while budget > 0 {
+            let job = match self.job.take() {
+                Some(job) => job,
+                None => match self.queue.pop() {
+                    Some(set) => {
+                        let (job, cost) = self.begin(scene, set);
+                        self.job = job;
+                        budget = budget.saturating_sub(cost);
+                        self.done += cost as u64;
+                        continue;
+                    }
+                    None => break,
+                },
+            };
+            let cost = self.advance(scene, visibility, job, budget).max(1);
+            budget = budget.saturating_sub(cost);
+            self.done += cost as u64;
+        }
+        self.progress()
+    }
+
+    /// How far it is.
+    pub fn progress(&self) -> Progress {
+        let sets = self.layout.sets();
+        let waiting: usize = self.queue.iter().map(|&set| 3 * sets[set].len() + 1).sum();
+        let job = self.job.as_ref().map_or(0, |job| {
+            let points = sets[job.set].len();
+            let texels = job.charts.texel_count() as usize;
+            match &job.stage {
+                Stage::Sites => texels + 1,
+                Stage::Weigh(b) => b.sites() - b.weighed() + b.sites() / ENCODED_A_TEXEL + 1,
+                Stage::Encode(b) => (b.sites() - b.encoded()) / ENCODED_A_TEXEL + 1,
+                Stage::Sum { next, .. } => (points - next) / SUMMED_A_TEXEL + 1,
+            }
+        });
+        Progress { done: self.done, total: self.done + (waiting + job) as u64 }
+    }
+
+    /// Makes the charts of a set, or takes those of an instance with the same.
+    fn begin(&mut self, scene: &Scene, set: usize) -> (Option<Job>, usize) {
+        let instance_index = self.layout.sets()[set].instance;
+        let instance = &scene.instances[instance_index as usize];
+        let mesh = &scene.meshes[instance.mesh as usize];
+        let defaults = ChartParams::for_spacing(self.layout.spacing_m(), self.moves[instance_index as usize]);
+        let key = InstanceKey {
+            mesh: instance.mesh,
+            rest_from_mesh: instance.rest_from_mesh,
+            texel_m: defaults.texel_m * self.params.texel_factor,
+        };
+        let same = self.sets.iter().find_map(|state| match state {
+            SetState::Ready(ready) if ready.charts_key == key => Some(ready.charts.clone()),
+            _ => None,
+        });
+        let cost = if same.is_some() { 1 } else { mesh.triangles.len() / TRIANGLES_A_TEXEL + 1 };
+        let charts = match same {
+            Some(charts) => charts,
+            None => {
+                match ChartSet::new(&scene.rest_positions(instance_index as usize), &mesh.triangles, &params)
+                {
+                    Ok(charts) => Arc::new(charts),
+                    Err(error) => {
+                        self.failed.push((instance_index, error.into()));
+                        return (None, cost);
+                    }
+                }
+            }
+        };
+        (Some(Job { set, charts, charts_key: key, stage: Stage::Sites }), cost)
+    }
+
+    /// One step of a job, at most `budget` texels of it where it can be cut; gives what it cost.
+    fn advance(&mut self, scene: &Scene, visibility: &[u8], job: Job, budget: usize) -> usize {
+        let layout = self.layout.clone();
+        let set = &layout.sets()[job.set];
+        let mut job = job;
+        let cost;
+        job.stage = match job.stage {
+            Stage::Sites => {
+                let mesh = &scene.meshes[scene.instances[set.instance as usize].mesh as usize];
+                let positions_rest = job.charts_key.positions_rest(&mesh.positions);
+                let sites = job.charts.sites(&positions_rest, &mesh.triangles);
+                let neighbours = PointNeighbours::new(&layout, set, &self.params.weights);
+                cost = sites.len() / 4 + mesh.triangles.len() / 4;
+                let cuts = self.cuts.as_ref().and_then(|cuts| cuts.for_sites(set.instance, &sites));
+                let cuts = cuts.map_or(Vec::new(), |set| set.cuts.clone());
+                Stage::Weigh(Box::new(Builder::new(neighbours, set, sites, cuts, job.charts.texel_count())))
+            }
+            Stage::Weigh(mut builder) => {
+                let before = builder.weighed();
+                builder.weigh(set, budget);
+                cost = builder.weighed() - before;
+                if builder.weighed() == builder.sites() {
+                    builder.begin_encoding();
+                    Stage::Encode(builder)
+                } else {
+                    Stage::Weigh(builder)
+                }
+            }
+            Stage::Encode(mut builder) => {
+                let before = builder.encoded();
+                builder.encode(budget.saturating_mul(ENCODED_A_TEXEL));
+                cost = (builder.encoded() - before) / ENCODED_A_TEXEL;
+                if builder.encoded() == builder.sites() {
+                    let (table, sums) = builder.finish();
+                    Stage::Sum { table, sums, next: 0 }
+                } else {
+                    Stage::Encode(builder)
+                }
+            }
+            Stage::Sum { table, mut sums, next } => {
+                let end = next.saturating_add(budget.saturating_mul(SUMMED_A_TEXEL)).min(set.len());
+                let first = set.first as usize;
+                add_values(&table, &mut sums, &visibility[first..first + set.len()], next..end);
+                cost = (end - next) / SUMMED_A_TEXEL;
+                if end == set.len() {
+                    self.place(job.set, job.charts, job.charts_key, table, sums);
+                    return cost;
+                }
+                Stage::Sum { table, sums, next: end }
+            }
+        };
+        self.job = Some(job);
+        cost
+    }
+
+    /// Gives a finished set its place in the layers.
+    fn place(
+        &mut self,
+        set: usize,
+        charts: Arc<ChartSet>,
+        charts_key: InstanceKey,
+        table: PointTexels,
+        sums: Sums,
+    ) {
+        let placements = match self.pages.place(charts.pages()) {
+            Ok(placements) => placements,
+            Err(error) => {
+                self.failed.push((self.layout.sets()[set].instance, error.into()));
+                return;
+            }
+        };
+        for (page, (placement, size)) in placements.iter().zip(charts.pages()).enumerate() {
+            let first = charts.first_texel_of_page(page);
+            self.pages.fill(*placement, *size, |i| [255, sums.value(first + i)]);
+        }
+        let placed = PlacedPages::new(&charts, &placements, self.pages.side());
+        let ready = ReadySet { charts, charts_key, table, sums, placements, placed };
+        self.sets[set] = SetState::Ready(Box::new(ready));
+        self.fresh.push(set);
+        self.ready.push(self.layout.sets()[set].instance);
+    }
+
+    /// Begins a fade: what was new so far becomes old. Call it before the changes of an update are applied (and show them
+    /// with a fade that starts at 0); without it texels go on fading from what they showed before.
+    pub fn begin_update(&mut self) {
+        for set in std::mem::take(&mut self.fresh) {
+            if let SetState::Ready(ready) = &self.sets[set] {
+                for (placement, size) in ready.placements.iter().zip(ready.charts.pages()) {
+                    self.pages.settle_page(*placement, *size);
+                }
+            }
+        }
+        for address in std::mem::take(&mut self.fading) {
+            self.pages.settle(address);
+        }
+    }
+
+    /// Takes over the changes of an update. Exact: after any sequence of changes the texels are those of an atlas
+    /// made afresh from the final values. Changes of points that do not exist are left out.
+    pub fn apply(&mut self, changes: impl IntoIterator<Item = PointChange>) {
+        let sets = self.layout.sets();
+        let mut at = 0;
+        for PointChange { point, old, new } in changes {
+            let difference = i32::from(new) - i32::from(old);
+            let in_set = |at: usize| {
+                sets.get(at).is_some_and(|s| s.first <= point && point - s.first < s.len() as u32)
+            };
+            if !in_set(at) {
+                // Empty sets share their first point with the one after them, which is the last of those.
+                at = sets.partition_point(|s| s.first <= point).saturating_sub(1);
+                if !in_set(at) {
+                    continue;
+                }
+            }
+            let local = (point - sets[at].first) as usize;
+            match &mut self.sets[at] {
+                SetState::Ready(ready) => {
+                    let mut walk = ready.placed.walk();
+                    let (sums, pages, fading) = (&mut ready.sums, &mut self.pages, &mut self.fading);
+                    ready.table.for_each(local, |texel, weight| {
+                        let value = sums.add(texel, weight, difference);
+                        pages.write(walk.address(texel), value, fading);
+                    });
+                }
+                SetState::Open => {
+                    if let Some(Job { set, stage: Stage::Sum { table, sums, next }, .. }) = &mut self.job
+                        && *set == at
+                        && local < *next
+                    {
+                        table.for_each(local, |texel, weight| {
+                            sums.add(texel, weight, difference);
+                        });
+                    }
+                }
+            }
+        }
+        // Who never begins an update must not pay for that with memory without bound.
+        if self.fading.len() > self.pages.texel_count() {
+            self.fading.sort_unstable();
+            self.fading.dedup();
+        }
+    }
+}
+
+impl Job {
+    fn memory_bytes(&self) -> u64 {
+        let stage = match &self.stage {
+            Stage::Sites => 0,
+            Stage::Weigh(builder) | Stage::Encode(builder) => builder.bytes(),
+            Stage::Sum { table, sums, .. } => table.bytes() + sums.bytes(),
+        };
+        self.charts.memory_bytes() + stage as u64
+    }
+}

@@ -1,0 +1,238 @@
+//! The layers that hold the pages of all instances: where each page lies, its texels, and what must be uploaded.
+
+use std::ops::Range;
+
+use dapple_store::charts::{Atlas, AtlasError, ChartSet, PageSize, Placement};
+
+/// Rows of a layer whose texels changed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DirtyBand {
+    /// Index of the layer.
+    pub layer: u32,
+    /// The rows.
+    pub y: Range<u32>,
+}
+
+/// Sides of layers, texels. No page is longer than the smaller.
+const SIDES: [u16; 2] = [1024, 2048];
+
+/// As many as every graphics card takes.
+const MOST_LAYERS: u16 = 256;
+
+/// Texels a point, gaps between pages counted, by which the side is chosen.
+const TEXELS_A_POINT: usize = 4;
+
+/// Clean rows between two dirty ones up to which one upload is cheaper than two.
+const BRIDGED_ROWS: u32 = 8;
+
+/// What a texel shows that nobody has written.
+const OPEN: [u8; 2] = [255, 255];
+
+/// Square layers of texels `[old, new]`.
+pub(super) struct Pages {
+    side: u32,
+    /// Layer after layer, rows from the top. A texel's index is its *address*.
+    texels: Vec<[u8; 2]>,
+    /// One for each row of each layer.
+    dirty: Vec<bool>,
+    places: Atlas,
+}
+
+impl Pages {
+    pub(super) fn for_points(points: usize) -> Pages {
+        let wanted = points * TEXELS_A_POINT;
+        let side = if wanted <= usize::from(SIDES[0]).pow(2) { SIDES[0] } else { SIDES[1] };
+        let places = Atlas::new(side, MOST_LAYERS);
+        Pages { side: u32::from(side), texels: Vec::new(), dirty: Vec::new(), places }
+    }
+
+    pub(super) fn side(&self) -> u32 {
+        self.side
+    }
+
+    pub(super) fn layers(&self) -> u32 {
+        u32::from(self.places.layers())
+    }
+
+    pub(super) fn texel_count(&self) -> usize {
+        self.texels.len()
+    }
+
+    pub(super) fn all_texels(&self) -> &[[u8; 2]] {
+        &self.texels
+    }
+
+    pub(super) fn texels(&self, layer: u32) -> &[[u8; 2]] {
+        let area = self.side as usize * self.side as usize;
+        &self.texels[layer as usize * area..][..area]
+    }
+
+    pub(super) fn texel(&self, layer: u32, x: u32, y: u32) -> [u8; 2] {
+        self.texels[self.address(layer, x, y) as usize]
+    }
+
+    fn address(&self, layer: u32, x: u32, y: u32) -> u32 {
+        (layer * self.side + y) * self.side + x
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        self.texels.len() * size_of::<[u8; 2]>() + self.dirty.len()
+    }
+
+    /// Finds places for the pages of an instance; makes new layers if there is no room.
+    pub(super) fn place(&mut self, sizes: &[PageSize]) -> Result<Vec<Placement>, AtlasError> {
+        let placements = self.places.insert(sizes)?;
+        let rows = (self.layers() * self.side) as usize;
+        if rows > self.dirty.len() {
+            self.texels.resize(rows * self.side as usize, OPEN);
+            self.dirty.resize(rows, true);
+            // A larger texture is a new one: everything must be uploaded.
+            self.dirty.fill(true);
+        }
+        Ok(placements)
+    }
+
+    /// Writes the texels of a page; `value` takes their index within the page.
+    pub(super) fn fill(&mut self, place: Placement, size: PageSize, value: impl Fn(u32) -> [u8; 2]) {
+        let mut index = 0;
+        for y in 0..u32::from(size.height) {
+            let start = self.address(u32::from(place.layer), u32::from(place.x), u32::from(place.y) + y) as usize;
+            for texel in &mut self.texels[start..start + usize::from(size.width)] {
+                *texel = value(index);
+                index += 1;
+            }
+            self.dirty[start / self.side as usize] = true;
+        }
+    }
+
+    /// Ends the fade of all texels of a page.
+    pub(super) fn settle_page(&mut self, place: Placement, size: PageSize) {
+        for y in 0..u32::from(size.height) {
+            let start = self.address(u32::from(place.layer), u32::from(place.x), u32::from(place.y) + y) as usize;
+            for texel in &mut self.texels[start..start + usize::from(size.width)] {
+                texel[0] = texel[1];
+            }
+            self.dirty[start / self.side as usize] = true;
+        }
+    }
+
+    /// Ends the fade of one texel.
+    pub(super) fn settle(&mut self, address: u32) {
+        let texel = &mut self.texels[address as usize];
+        if texel[0] != texel[1] {
+            texel[0] = texel[1];
+            self.dirty[(address / self.side) as usize] = true;
+        }
+    }
+
+    /// Gives a texel a new value. Its address joins `fading` if it did not fade before.
+    #[inline]
+    pub(super) fn write(&mut self, address: u32, value: u8, fading: &mut Vec<u32>) {
+        let texel = &mut self.texels[address as usize];
+        if texel[1] == value {
+            return;
+        }
+        if texel[0] == texel[1] {
+            fading.push(address);
+        }
+        texel[1] = value;
+        self.dirty[(address / self.side) as usize] = true;
+    }
+
+    /// The rows that changed since the last call, joined to bands.
+    pub(super) fn take_dirty(&mut self) -> Vec<DirtyBand> {
+        let mut bands: Vec<DirtyBand> = Vec::new();
+        for (layer, rows) in (0u32..).zip(self.dirty.chunks_mut(self.side as usize)) {
+            for (y, row) in (0u32..).zip(rows) {
+                if !std::mem::take(row) {
+                    continue;
+                }
+                match bands.last_mut() {
+                    Some(band) if band.layer == layer && y - band.y.end <= BRIDGED_ROWS => band.y.end = y + 1,
+                    _ => bands.push(DirtyBand { layer, y: y..y + 1 }),
+                }
+            }
+        }
+        bands
+    }
+}
+
+/// Pages of one instance where they lie: from a number of a texel to its address.
+#[derive(Clone, Debug)]
+pub(super) struct PlacedPages {
+    pages: Vec<PlacedPage>,
+    side: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct PlacedPage {
+    first_texel: u32,
+    width: u32,
+    address: u32,
+}
+
+impl PlacedPages {
+    pub(super) fn new(charts: &ChartSet, placements: &[Placement], side: u32) -> PlacedPages {
+        let place = |(page, (p, size)): (usize, (&Placement, &PageSize))| PlacedPage {
+            first_texel: charts.first_texel_of_page(page),
+            width: u32::from(size.width),
+            address: (u32::from(p.layer) * side + u32::from(p.y)) * side + u32::from(p.x),
+        };
+        PlacedPages { pages: placements.iter().zip(charts.pages()).enumerate().map(place).collect(), side }
+    }
+
+    /// A walk over texels that mostly follow each other.
+    #[inline]
+    pub(super) fn walk(&self) -> Walk<'_> {
+        Walk { placed: self, first: 0, width: 0, address: 0 }
+    }
+}
+
+/// Remembers the row of the last texel.
+pub(super) struct Walk<'a> {
+    placed: &'a PlacedPages,
+    first: u32,
+    width: u32,
+    address: u32,
+}
+
+impl Walk<'_> {
+    /// Address of a texel, which must exist.
+    #[inline]
+    pub(super) fn address(&mut self, texel: u32) -> u32 {
+        let within = texel.wrapping_sub(self.first);
+        if within < self.width {
+            return self.address + within;
+        }
+        let pages = &self.placed.pages;
+        let at = if pages.len() == 1 { 0 } else { pages.partition_point(|p| p.first_texel <= texel) - 1 };
+        let page = &pages[at];
+        let row = (texel - page.first_texel) / page.width;
+        self.first = page.first_texel + row * page.width;
+        self.width = page.width;
+        self.address = page.address + row * self.placed.side;
+        self.address + texel - self.first
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dirty_rows_are_told_once() {
+        let mut pages = Pages::for_points(1000);
+        let size = PageSize { width: 10, height: 40 };
+        let place = pages.place(&[size]).unwrap()[0];
+        assert_eq!(pages.take_dirty(), [DirtyBand { layer: 0, y: 0..1024 }], "a new layer");
+        pages.fill(place, size, |i| [i as u8, 7]);
+        assert_eq!(pages.take_dirty(), [DirtyBand { layer: 0, y: 0..40 }]);
+        let mut fading = Vec::new();
+        for (x, y, value) in [(3, 1, 9), (4, 1, 9), (3, 5, 8), (3, 30, 1), (3, 31, 7)] {
+            pages.write(pages.address(0, x, y), value, &mut fading);
+        }
+        assert_eq!(pages.take_dirty(), [DirtyBand { layer: 0, y: 1..6 }, DirtyBand { layer: 0, y: 30..31 }]);
+        assert!(pages.take_dirty().is_empty());
+        assert_eq!(pages.texel(0, 3, 30), [(30 * 10 + 3) as u8, 1]);
+    }
+}

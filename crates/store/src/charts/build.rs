@@ -1,0 +1,160 @@
+//! Makes the charts of a mesh: grown, laid flat, packed; or a texel for each vertex of a very fine one.
+
+use glam::{DVec3, Vec3};
+
+use super::flatten::Flat;
+use super::grow::{GrowParams, grow_all};
+use super::pack::{Packed, pack};
+use super::per_vertex::vertex_pages;
+use super::set::{Chart, ChartError, ChartParams, ChartUv, MOST_TEXELS, PageSize};
+use super::surface::{NONE, Surface};
+
+/// Rows of texels that slivers may cross, together, before texels are made coarser: it bounds the time taken.
+const MOST_ROWS: f64 = (1u64 << 27) as f64;
+
+/// The mesh is fine if at least this part of its triangles is smaller than a texel.
+const FINE_PART: f64 = 0.9;
+
+/// Tries to find a texel edge that keeps to [`MOST_TEXELS`].
+const MOST_TRIES: usize = 12;
+
+/// What a [`super::ChartSet`] is made of.
+#[derive(Debug, Default)]
+pub(super) struct Layout {
+    pub(super) pages: Vec<PageSize>,
+    pub(super) per_vertex: bool,
+    pub(super) corners: Vec<[ChartUv; 3]>,
+    pub(super) chart_of: Vec<u32>,
+    pub(super) charts: Vec<Chart>,
+    pub(super) lone: Option<u32>,
+    pub(super) texel: f64,
+}
+
+/// Makes the charts. `params` and indices are checked.
+pub(super) fn lay_out(
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    params: &ChartParams,
+) -> Result<Layout, ChartError> {
+    if triangles.is_empty() {
+        return Ok(Layout::default());
+    }
+    let surface = Surface::new(positions, triangles);
+    let mut texel = first_texel(&surface, params);
+    let mut pieces = 0;
+    for _ in 0..MOST_TRIES {
+        let params =
+            GrowParams { texel, least_cosine: f64::from(params.least_cosine), max_side: params.max_side };
+        let flat = Flattened::new(&surface, params);
+        let sizes: Vec<[u16; 2]> = flat.charts.iter().map(|c| c.size).collect();
+        let packed = pack(&sizes, params.max_side);
+        let count = packed.texel_count();
+        if is_fine(&surface, texel) {
+            let fewer = count.saturating_sub(1).min(u64::from(MOST_TEXELS));
+            if let Some(found) = vertex_pages(&surface, positions.len(), triangles, params.max_side, fewer) {
+                let (pages, corners) = (found.pages, found.corners);
+                return Ok(Layout { pages, corners, per_vertex: true, texel, ..Layout::default() });
+            }
+        }
+        if count <= u64::from(MOST_TEXELS) {
+            return Ok(flat.place(&surface, packed, texel));
+        }
+        pieces = flat.charts.len();
+        texel *= (count as f64 / f64::from(MOST_TEXELS)).sqrt().clamp(1.1, 64.0) * 1.02;
+    }
+    Err(ChartError::TooManyPieces { charts: pieces, limit: MOST_TEXELS })
+}
+
+/// The texel edge asked for, or a coarser one where area or slivers rule it out from the start.
+fn first_texel(surface: &Surface, params: &ChartParams) -> f64 {
+    let mut texel = f64::from(params.texel_m);
+    let most_of_one = 0.5 * f64::from(params.max_side) * f64::from(params.max_side);
+    let rows: f64 = (0..surface.corners.len()).map(|t| surface.longest_edge(t)).sum();
+    texel = texel.max(rows / MOST_ROWS);
+    for _ in 0..MOST_TRIES {
+        let texels: f64 =
+            surface.double_areas.iter().map(|a| (0.5 * a / (texel * texel)).min(most_of_one)).sum();
+        if texels <= f64::from(MOST_TEXELS) {
+            break;
+        }
+        texel *= (texels / f64::from(MOST_TEXELS)).sqrt().max(1.02);
+    }
+    texel
+}
+
+/// Whether nearly all triangles are smaller than a texel.
+fn is_fine(surface: &Surface, texel: f64) -> bool {
+    let solid = (0..surface.corners.len()).filter(|&t| !surface.is_degenerate(t));
+    let (mut all, mut small) = (0u64, 0u64);
+    for t in solid {
+        all += 1;
+        small += u64::from(surface.longest_edge(t) <= texel);
+    }
+    all > 0 && small as f64 >= FINE_PART * all as f64
+}
+
+/// Charts laid flat, not packed yet.
+struct Flattened {
+    charts: Vec<Flat>,
+    chart_of: Vec<u32>,
+    /// Triangles without area, and the place whose texel they read.
+    anchors: Vec<(u32, DVec3)>,
+    lone: Option<u32>,
+}
+
+impl Flattened {
+    fn new(surface: &Surface, params: GrowParams) -> Flattened {
+        let grown = grow_all(surface, params);
+        let mut charts: Vec<Flat> = grown.iter().map(|c| c.1).collect();
+        let count = surface.corners.len();
+        let mut chart_of = vec![NONE; count];
+        for (chart, (grown, _)) in grown.iter().enumerate() {
+            for &t in &grown.triangles {
+                chart_of[t as usize] = chart as u32;
+            }
+        }
+        let mut chart_at = vec![NONE; surface.places.len()];
+        for t in 0..count {
+            if surface.repeats[t] != NONE {
+                chart_of[t] = chart_of[surface.repeats[t] as usize];
+            }
+            for place in surface.corners[t] {
+                if chart_of[t] != NONE && chart_at[place as usize] == NONE {
+                    chart_at[place as usize] = chart_of[t];
+                }
+            }
+        }
+        let mut anchors = Vec::new();
+        let mut lone = None;
+        for t in (0..count).filter(|&t| surface.is_degenerate(t)) {
+            let at = surface.corners[t].into_iter().find(|&place| chart_at[place as usize] != NONE);
+            let place = surface.places[at.unwrap_or(surface.corners[t][0]) as usize];
+            chart_of[t] = match at {
+                Some(at) => chart_at[at as usize],
+                None => *lone.get_or_insert_with(|| {
+                    charts.push(Flat::single(place, params.texel));
+                    charts.len() as u32 - 1
+                }),
+            };
+            anchors.push((t as u32, place));
+        }
+        Flattened { charts, chart_of, anchors, lone }
+    }
+
+    fn place(self, surface: &Surface, packed: Packed, texel: f64) -> Layout {
+        let charts: Vec<Chart> = self
+            .charts
+            .iter()
+            .zip(&packed.places)
+            .map(|(&flat, &(page, x, y))| Chart { flat, page: page as u16, corner: [x, y] })
+            .collect();
+        let mut corners: Vec<[ChartUv; 3]> = (0..surface.corners.len())
+            .map(|t| surface.corner_places(t).map(|place| charts[self.chart_of[t] as usize].uv_of(place)))
+            .collect();
+        for &(t, place) in &self.anchors {
+            corners[t as usize] = [charts[self.chart_of[t as usize] as usize].uv_of(place); 3];
+        }
+        let (pages, chart_of, lone) = (packed.pages, self.chart_of, self.lone);
+        Layout { pages, per_vertex: false, corners, chart_of, charts, lone, texel }
+    }
+}

@@ -1,0 +1,349 @@
+//! Grows charts over a surface: connected triangles that one direction sees side by side, nowhere behind each other.
+
+use glam::{DVec2, DVec3};
+
+use super::flatten::{Flat, flatten};
+use super::raster::touched;
+use super::set::TEXEL_FRACTION;
+use super::surface::{NONE, Surface};
+
+/// How far, in texels, two places over one texel may be apart along the normal beyond what the cone allows.
+const HEIGHT_TOLERANCE: f64 = 0.25;
+
+/// How far apart, in texels, the planes of the triangles over one texel may pass its centre.
+const MOST_RANGE: f64 = 2.0;
+
+/// Triangles dropped from charts for each of the mesh; beyond, charts may keep what lies over each other.
+const MOST_DROPPED: usize = 8;
+
+/// A mean normal closer to the seed's than this (1.8°) is not worth growing again for.
+const SAME_AXIS: f64 = 0.9995;
+
+/// Limits of growth.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct GrowParams {
+    /// Edge of a texel.
+    pub(super) texel: f64,
+    /// Least cosine between a triangle's normal and the chart's.
+    pub(super) least_cosine: f64,
+    /// Longest side, texels.
+    pub(super) max_side: u16,
+}
+
+/// Three axes at right angles; the third is the chart's normal.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Frame {
+    pub(super) origin: DVec3,
+    pub(super) axes: [DVec3; 3],
+}
+
+impl Frame {
+    /// Some frame with the given normal (unit length).
+    pub(super) fn with_normal(origin: DVec3, normal: DVec3) -> Frame {
+        let size = normal.abs();
+        let away = if size.x <= size.y && size.x <= size.z {
+            DVec3::X
+        } else if size.y <= size.z {
+            DVec3::Y
+        } else {
+            DVec3::Z
+        };
+        let tangent = normal.cross(away);
+        let tangent = tangent / tangent.length();
+        Frame { origin, axes: [tangent, normal.cross(tangent), normal] }
+    }
+
+    /// Coordinates in the frame.
+    pub(super) fn project(&self, place: DVec3) -> DVec3 {
+        let d = place - self.origin;
+        DVec3::new(d.dot(self.axes[0]), d.dot(self.axes[1]), d.dot(self.axes[2]))
+    }
+}
+
+/// A chart before it is laid out.
+#[derive(Clone, Debug)]
+pub(super) struct Grown {
+    /// Seed first.
+    pub(super) triangles: Vec<u32>,
+    pub(super) frame: Frame,
+    /// Edge of its texels: coarser than asked for where one triangle alone would exceed the longest side.
+    pub(super) texel: f64,
+}
+
+/// Cuts the whole surface into charts, in order of their seeds: largest triangle first. Triangles without area and
+/// repeated ones are left out.
+pub(super) fn grow_all(surface: &Surface, params: GrowParams) -> Vec<(Grown, Flat)> {
+    let mut seeds: Vec<u32> = (0..surface.corners.len() as u32)
+        .filter(|&t| !surface.is_degenerate(t as usize) && surface.repeats[t as usize] == NONE)
+        .collect();
+    // Areas are positive, so their bits are in order.
+    seeds.sort_unstable_by_key(|&t| (std::cmp::Reverse(surface.double_areas[t as usize].to_bits()), t));
+    let mut grower = Grower {
+        surface,
+        params,
+        steepness: (1.0 - params.least_cosine * params.least_cosine).max(0.0).sqrt() / params.least_cosine,
+        taken: vec![false; surface.corners.len()],
+        seen: vec![0; surface.corners.len()],
+        stamp: 0,
+        cells: Cells::new(),
+        dropped: 0,
+        most_dropped: MOST_DROPPED * surface.corners.len(),
+    };
+    let mut charts = Vec::new();
+    for seed in seeds {
+        if !grower.taken[seed as usize] {
+            let chart = grower.grow_best(seed);
+            let chart = grower.settle(chart);
+            for &t in &chart.0.triangles {
+                grower.taken[t as usize] = true;
+            }
+            charts.push(chart);
+        }
+    }
+    charts
+}
+
+struct Grower<'s> {
+    surface: &'s Surface,
+    params: GrowParams,
+    /// Tangent of the cone's half angle: how steep a chart may be.
+    steepness: f64,
+    taken: Vec<bool>,
+    /// Growth that last looked at a triangle.
+    seen: Vec<u32>,
+    stamp: u32,
+    cells: Cells,
+    /// Triangles dropped from charts so far, and when to stop, which bounds the time taken.
+    dropped: usize,
+    most_dropped: usize,
+}
+
+impl Grower<'_> {
+    /// Grows about the seed's normal to learn the mean normal, then about that. Keeps the first if the second came out at
+    /// less than half its size, which also bounds the time spent on what is not kept.
+    fn grow_best(&mut self, seed: u32) -> Grown {
+        let seed_normal = self.surface.normals[seed as usize];
+        let first = self.grow(seed, seed_normal);
+        let sum: DVec3 = first.triangles.iter().fold(DVec3::ZERO, |sum, &t| {
+            sum + self.surface.normals[t as usize] * self.surface.double_areas[t as usize]
+        });
+        let mean = sum / sum.length();
+        if !mean.is_finite() || mean.dot(seed_normal) > SAME_AXIS {
+            return first;
+        }
+        let second = self.grow(seed, mean);
+        if second.triangles.len() * 2 < first.triangles.len() { first } else { second }
+    }
+
+    fn grow(&mut self, seed: u32, normal: DVec3) -> Grown {
+        let surface = self.surface;
+        let frame = Frame::with_normal(surface.corner_places(seed as usize)[0], normal);
+        let corners = surface.corner_places(seed as usize).map(|p| frame.project(p));
+        let [mut low, mut high] = bounds(corners);
+        let steps = f64::from(self.params.max_side - 1);
+        let texel = self.params.texel.max((high - low).max_element() / steps);
+        let longest = texel * steps;
+        self.stamp += 1;
+        self.cells.clear();
+        let mut triangles = vec![seed];
+        self.seen[seed as usize] = self.stamp;
+        self.claim_in(seed, corners, &frame, texel);
+        let mut next = 0;
+        while next < triangles.len() {
+            for neighbour in surface.neighbours[triangles[next] as usize] {
+                let n = neighbour as usize;
+                if neighbour == NONE || self.taken[n] || self.seen[n] == self.stamp {
+                    continue;
+                }
+                self.seen[n] = self.stamp;
+                if surface.normals[n].dot(normal) < self.params.least_cosine {
+                    continue;
+                }
+                let corners = surface.corner_places(n).map(|p| frame.project(p));
+                let [own_low, own_high] = bounds(corners);
+                let (new_low, new_high) = (low.min(own_low), high.max(own_high));
+                if (new_high - new_low).max_element() > longest
+                    || !self.claim_in(neighbour, corners, &frame, texel)
+                {
+                    continue;
+                }
+                (low, high) = (new_low, new_high);
+                triangles.push(neighbour);
+            }
+            next += 1;
+        }
+        Grown { triangles, frame, texel }
+    }
+
+    /// [`Grower::claim`] in the frame that a chart grows in.
+    fn claim_in(&mut self, triangle: u32, corners: [DVec3; 3], frame: &Frame, texel: f64) -> bool {
+        let normal = self.surface.normals[triangle as usize];
+        let normal = DVec3::from_array(frame.axes.map(|axis| axis.dot(normal)));
+        let corners = corners.map(|p| (p.truncate() / texel).extend(p.z));
+        self.claim(corners, normal, DVec2::splat(texel), texel)
+    }
+
+    /// Takes the texels of a triangle; false, and nothing is taken, if one of them is at another height already.
+    ///
+    /// `corners` are x and y in texels, whose edges are `step`, and height. Two places of a surface inside the cone can
+    /// differ in height by no more than its steepness times their distance; and one texel cannot stand for places
+    /// that lie far apart, be they ever so close to each other seen from above.
+    fn claim(&mut self, corners: [DVec3; 3], normal: DVec3, step: DVec2, texel: f64) -> bool {
+        // Height gained by one texel along x and y.
+        let slope = -normal.truncate() * step / normal.z;
+        let height_at = |p: DVec2| corners[0].z + slope.dot(p - corners[0].truncate());
+        self.cells.begin();
+        let (cells, steepness) = (&mut self.cells, self.steepness);
+        let fits = touched(corners.map(|c| c.truncate()), |x, y, closest| {
+            let height = height_at(closest);
+            let over_centre = height_at(DVec2::new(f64::from(x), f64::from(y)));
+            let Some(cell) = cells.get_or_insert((x, y), Cell { closest, height, range: [over_centre; 2] })
+            else {
+                return true;
+            };
+            let allowed = steepness * ((closest - cell.closest) * step).length() + HEIGHT_TOLERANCE * texel;
+            let range = [cell.range[0].min(over_centre), cell.range[1].max(over_centre)];
+            let fits = (height - cell.height).abs() <= allowed && range[1] - range[0] <= MOST_RANGE * texel;
+            if fits && range != cell.range {
+                cells.replace((x, y), Cell { range, ..cell });
+            }
+            fits
+        });
+        if !fits {
+            self.cells.roll_back();
+        }
+        fits
+    }
+
+    /// Lays a chart flat, and drops from it the triangles that the turned grid brings over others.
+    fn settle(&mut self, mut chart: Grown) -> (Grown, Flat) {
+        let flat = flatten(self.surface, &chart, self.params.max_side);
+        self.cells.clear();
+        let before = chart.triangles.len();
+        let mut triangles = std::mem::take(&mut chart.triangles);
+        triangles.retain(|&t| {
+            let normal = self.surface.normals[t as usize];
+            let normal = DVec3::from_array(flat.frame.axes.map(|axis| axis.dot(normal)));
+            let corners = self.surface.corner_places(t as usize).map(|place| {
+                let [x, y] = flat.snapped_texel_of(place);
+                let offset = DVec2::new(f64::from(x), f64::from(y)) / f64::from(TEXEL_FRACTION) - 0.5;
+                offset.extend(flat.frame.project(place).z)
+            });
+            self.claim(corners, normal, flat.step, chart.texel) || self.dropped >= self.most_dropped
+        });
+        self.dropped += before - triangles.len();
+        chart.triangles = triangles;
+        (chart, flat)
+    }
+}
+
+fn bounds(corners: [DVec3; 3]) -> [DVec2; 2] {
+    let [a, b, c] = corners.map(|c| c.truncate());
+    [a.min(b).min(c), a.max(b).max(c)]
+}
+
+/// What lies over a texel.
+#[derive(Clone, Copy, Debug, Default)]
+struct Cell {
+    /// Place of the first triangle closest to the texel's centre, in texels.
+    closest: DVec2,
+    /// Its height.
+    height: f64,
+    /// Least and greatest height over the centre of all triangles' planes.
+    range: [f64; 2],
+}
+
+/// Cells by texel: open addressing, emptied in no time by a new generation.
+struct Cells {
+    /// Generation and texel of each slot; a slot of another generation is free.
+    keys: Vec<(u32, (i32, i32))>,
+    values: Vec<Cell>,
+    generation: u32,
+    /// Slots in use, in order of insertion.
+    used: Vec<u32>,
+    /// Where the current triangle's begin in `used`.
+    begun: usize,
+    /// What the current triangle replaced.
+    replaced: Vec<(u32, Cell)>,
+}
+
+impl Cells {
+    fn new() -> Cells {
+        Cells {
+            keys: vec![(0, (0, 0)); 64],
+            values: vec![Cell::default(); 64],
+            generation: 1,
+            used: vec![],
+            begun: 0,
+            replaced: vec![],
+        }
+    }
+
+    fn clear(&mut self) {
+        self.generation += 1;
+        self.used.clear();
+        self.begun = 0;
+    }
+
+    /// From here on insertions can be rolled back.
+    fn begin(&mut self) {
+        self.begun = self.used.len();
+        self.replaced.clear();
+    }
+
+    /// Undoes what was done since [`Cells::begin`]. The last in go first, so no chain of slots is broken.
+    fn roll_back(&mut self) {
+        for (slot, cell) in self.replaced.drain(..).rev() {
+            self.values[slot as usize] = cell;
+        }
+        for slot in self.used.drain(self.begun..).rev() {
+            self.keys[slot as usize].0 = 0;
+        }
+    }
+
+    fn get_or_insert(&mut self, texel: (i32, i32), cell: Cell) -> Option<Cell> {
+        if self.used.len() * 2 >= self.keys.len() {
+            self.double();
+        }
+        let slot = self.slot_of(texel);
+        if self.keys[slot].0 == self.generation {
+            return Some(self.values[slot]);
+        }
+        self.keys[slot] = (self.generation, texel);
+        self.values[slot] = cell;
+        self.used.push(slot as u32);
+        None
+    }
+
+    /// Replaces the cell of a texel that is there.
+    fn replace(&mut self, texel: (i32, i32), cell: Cell) {
+        let slot = self.slot_of(texel);
+        self.replaced.push((slot as u32, std::mem::replace(&mut self.values[slot], cell)));
+    }
+
+    fn slot_of(&self, texel: (i32, i32)) -> usize {
+        let mixed =
+            (u64::from(texel.0 as u32) << 32 | u64::from(texel.1 as u32)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let mask = self.keys.len() - 1;
+        let mut slot = (mixed >> 32) as usize & mask;
+        while self.keys[slot].0 == self.generation && self.keys[slot].1 != texel {
+            slot = (slot + 1) & mask;
+        }
+        slot
+    }
+
+    fn double(&mut self) {
+        let entries: Vec<((i32, i32), Cell)> =
+            self.used.iter().map(|&slot| (self.keys[slot as usize].1, self.values[slot as usize])).collect();
+        let size = self.keys.len() * 2;
+        self.keys = vec![(0, (0, 0)); size];
+        self.values = vec![Cell::default(); size];
+        self.used.clear();
+        for (texel, cell) in entries {
+            let slot = self.slot_of(texel);
+            self.keys[slot] = (self.generation, texel);
+            self.values[slot] = cell;
+            self.used.push(slot as u32);
+        }
+    }
+}
