@@ -295,8 +295,7 @@ impl Core {
     }
 
     fn can(&self, method: Method) -> bool {
-        method != Method::PsaoPaper
-            || self.screen.gpu.has_storage_buffers()
+        method != Method::PsaoPaper || self.screen.gpu.has_storage_buffers()
     }
 
     /// Width of the picture per height.
