@@ -115,13 +115,13 @@ fn check(what: &str, store: &PointStore, fragments: &[Option<RestSurface>], widt
 
     let tables = paper.make_textures(&gpu.device).unwrap();
     paper.upload(&gpu.queue, &tables);
-    let groups = [Bindings::new(), table_bindings(&tables, 0)];
+    let groups = [Bindings::new(), Bindings::new(), table_bindings(&tables, 0)];
     let pass = frame.pass("paper", &files(&hash_wgsl()), "main", &groups, TARGET_FORMAT);
     assert_agree(&format!("{what}, paper"), &frame.run(&pass)[..fragments.len()], &paper.reconstruct(fragments));
 
     let cell_tables = direct.make_textures(&gpu.device).unwrap();
     direct.upload(&gpu.queue, &cell_tables);
-    let groups = [Bindings::new(), table_bindings(&cell_tables, 3)];
+    let groups = [Bindings::new(), Bindings::new(), table_bindings(&cell_tables, 3)];
     let cells_pass = frame.pass("direct", &files(&cells_wgsl()), "main", &groups, TARGET_FORMAT);
     let twin = direct.reconstruct(fragments);
     assert_agree(&format!("{what}, direct"), &frame.run(&cells_pass)[..fragments.len()], &twin);

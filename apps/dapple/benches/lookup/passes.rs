@@ -185,7 +185,7 @@ fn look_up(
     function: &str,
     binding: u32,
 ) -> Candidate {
-    let groups = [Bindings::new(), table_bindings(tables, binding)];
+    let groups = [Bindings::new(), Bindings::new(), table_bindings(tables, binding)];
     let call = format!("{function}(f.instance, f.position_rest, f.normal_rest)");
     Candidate::main(name, frame, &[wgsl], &call, &groups)
 }
