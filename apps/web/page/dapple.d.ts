@@ -1,7 +1,6 @@
 // Types and documentation of dapple.js.
 
-/** How visibility is found: points through the atlas, the paper's look-up (where the device has storage buffers), or
- * not at all. */
+/** How visibility is found: points through the atlas, points by the paper's look-up, or not at all. */
 export type Method = "psao" | "psao-paper" | "none";
 
 /** What is shown. */
@@ -109,8 +108,6 @@ export interface Viewer {
   readonly stats: Stats;
   /** What the loader mended in the scene. */
   readonly warnings: string[];
-  /** The methods that work on this device. */
-  readonly methods: Method[];
   /** Names of the scene's camera paths; the last circles the scene. */
   readonly cameras: string[];
   play(): void;

@@ -240,10 +240,6 @@ class Viewer {
     return this.#living().warnings();
   }
 
-  get methods() {
-    return this.#living().methods();
-  }
-
   get cameras() {
     return this.#living().cameraPaths();
   }

@@ -225,10 +225,6 @@ async function start() {
     splitAt = options.split.position;
     other.value = options.split.method;
   }
-  const { methods } = created;
-  for (const option of [...method.options, ...other.options]) {
-    if (option.value && !methods.includes(option.value)) option.remove();
-  }
   const { path, walking } = created.getCamera();
   listCameras(path ?? (walking ? " walk" : " orbit"));
   listen();

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dapple_client::viewer::{DebugView, DrawOptions, LoadProgress, Method, Viewer, ViewerConfig};
+use dapple_client::viewer::{DebugView, DrawOptions, LoadProgress, Viewer, ViewerConfig};
 use dapple_render::shade::ShadeParams;
 use dapple_scene::{NoFiles, Scene};
 use dapple_stream::{Limits, Recording, Replay};
@@ -195,15 +195,9 @@ impl Core {
     /// How visibility is found, by name.
     #[wasm_bindgen(js_name = setMethod)]
     pub fn set_method(&mut self, name: &str) -> Result<(), JsError> {
-        self.options.method = self.method(name)?;
+        self.options.method = names::method(name)?;
         self.changed = true;
         Ok(())
-    }
-
-    /// Names of the methods that work on this device.
-    pub fn methods(&self) -> Vec<String> {
-        let works = |name: &&str| names::method(name).is_ok_and(|method| self.can(method));
-        names::methods().filter(works).map(str::to_owned).collect()
     }
 
     /// What is shown, by name.
@@ -218,7 +212,7 @@ impl Core {
     #[wasm_bindgen(js_name = setSplit)]
     pub fn set_split(&mut self, position: f32, method: &str) -> Result<(), JsError> {
         let position = if position.is_finite() { position.clamp(0.0, 1.0) } else { 0.5 };
-        self.options.split = Some((position, self.method(method)?));
+        self.options.split = Some((position, names::method(method)?));
         self.changed = true;
         Ok(())
     }
@@ -282,20 +276,6 @@ impl Core {
     pub fn warnings(&self) -> Vec<String> {
         let scene = self.shown.as_ref().map(|shown| &shown.scene);
         scene.iter().flat_map(|scene| &scene.warnings).map(|warning| warning.message.clone()).collect()
-    }
-
-    fn method(&self, name: &str) -> Result<Method, JsError> {
-        let method = names::method(name)?;
-        if !self.can(method) {
-            return Err(JsError::new(&format!(
-                "the method \"{name}\" needs storage buffers, which this device lacks"
-            )));
-        }
-        Ok(method)
-    }
-
-    fn can(&self, method: Method) -> bool {
-        method != Method::PsaoPaper || self.screen.gpu.has_storage_buffers()
     }
 
     /// Width of the picture per height.

@@ -60,11 +60,6 @@ pub fn method(name: &str) -> Result<Method, UnknownName> {
     find(&METHODS, "method", name)
 }
 
-/// The names of all methods.
-pub fn methods() -> impl Iterator<Item = &'static str> {
-    METHODS.iter().map(|(name, _)| *name)
-}
-
 /// The view of that name: `beauty`, `visibility`, `normal`, `points`, `texels`, `weights`, `age`, `error`.
 pub fn view(name: &str) -> Result<DebugView, UnknownName> {
     find(&VIEWS, "view", name)

@@ -229,7 +229,7 @@ fn the_handle_plays_seeks_and_steers() {
         for (const view of ['visibility', 'normal', 'points', 'texels', 'weights', 'age', 'error', 'beauty']) {
           viewer.setView(view); await sleep(60);
         }
-        for (const method of viewer.methods) viewer.setMethod(method);
+        for (const method of ['none', 'psao-paper', 'psao']) { viewer.setMethod(method); await sleep(60); }
         viewer.setSplit(0.3, 'none'); await sleep(60); viewer.setSplit(null);
         return facts;";
     let pages: Vec<Value> = ["webgpu", "webgl2"]

@@ -3,9 +3,8 @@
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
-use dapple_client::{Client, PictureParams, draw};
+use dapple_client::{Client, PictureParams, Reconstruction, draw};
 use dapple_render::image::ToneMap;
-use dapple_render::psao::Kernel;
 use dapple_render::shade::ShadeParams;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{NoFiles, PosedCamera, Scene, builtin};
@@ -100,7 +99,7 @@ fn take(name: &'static str, scene: &Scene, client: &Client, eye: Vec3, target: V
     let params =
         PictureParams { width: WIDTH, height: HEIGHT, supersample: 2, shade: ShadeParams::default() };
     let drawn = draw(scene, &camera, time_s, &params).expect("a picture");
-    let visibility = client.visibility(&drawn, &Kernel::default());
+    let visibility = client.visibility(&drawn, &Reconstruction::default());
     let [lit, open] = [Some(visibility.as_slice()), None].map(|visibility| {
         let picture = drawn.compose(visibility).expect("a visibility a sample").to_rgb8(&ToneMap::default());
         picture.pixels.into_flattened()
