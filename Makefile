@@ -5,7 +5,7 @@ export PATH := $(PATH):$(HOME)/.cargo/bin
 
 REPORT := $(CURDIR)/out/demo
 
-.PHONY: demo test bench check fmt
+.PHONY: demo web test bench check fmt
 
 # The whole loop on the built-in scene, and a report of it.
 demo:
@@ -13,6 +13,11 @@ demo:
 	cargo run --release --package dapple -- eval --out out/demo
 	@echo
 	@echo "The report: file://$(REPORT)/report.html"
+
+# The page, into target/web, for any static server.
+web:
+	@bash scripts/setup.sh web
+	cargo xtask wasm
 
 # All checks and tests; what CI runs.
 test:
