@@ -7,12 +7,13 @@ REPORT := $(CURDIR)/out/demo
 
 .PHONY: demo web test bench check fmt
 
-# The whole loop on the built-in scene, and a report of it.
+# The whole loop on the built-in scene and a report of it; then the page, served on this machine (not with CI set).
 demo:
 	@bash scripts/setup.sh
 	cargo run --release --package dapple -- eval --out out/demo
 	@echo
 	@echo "The report: file://$(REPORT)/report.html"
+	@if [ -z "$$CI" ]; then cargo xtask wasm && cargo run --release --package dapple -- demo; fi
 
 # The page, into target/web, for any static server.
 web:

@@ -1,5 +1,6 @@
 //! Command-line arguments.
 
+mod view;
 mod watch;
 
 use std::path::PathBuf;
@@ -8,7 +9,8 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
 
-pub(crate) use watch::{InspectArgs, LightArgs, RecordArgs};
+pub(crate) use view::{Preset, ViewArgs, ViewKind, ViewMethod};
+pub(crate) use watch::{DemoArgs, InspectArgs, LightArgs, RecordArgs};
 
 /// Ray-traced ambient visibility, computed once on a server and streamed to thin clients.
 #[derive(Debug, Parser)]
@@ -38,6 +40,12 @@ pub(crate) enum Command {
     /// Say what is in a .dapple file, and whether it is whole.
     #[command(after_help = watch::INSPECT_EXAMPLES)]
     Inspect(InspectArgs),
+    /// Show a scene and its light in a window, or as pictures without one.
+    #[command(after_help = view::VIEW_EXAMPLES)]
+    View(ViewArgs),
+    /// Serve a built-in scene and its light to browsers on this machine.
+    #[command(after_help = watch::DEMO_EXAMPLES)]
+    Demo(DemoArgs),
 }
 
 const EVAL_EXAMPLES: &str = "\

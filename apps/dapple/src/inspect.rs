@@ -44,9 +44,18 @@ pub(crate) fn run(args: &InspectArgs) -> Result<()> {
         say!("points     {} on {} instances, spacing {spacing_m:.4} m", layout.len(), layout.sets().len());
     }
     let per_second = |bytes: u64| if seconds > 0.0 { bytes as f64 * 8e-3 / seconds } else { 0.0 };
-    say!("snapshots  {} in {} bytes, {:.1} kbit/s", snapshots.count, snapshots.bytes, per_second(snapshots.bytes));
+    say!(
+        "snapshots  {} in {} bytes, {:.1} kbit/s",
+        snapshots.count,
+        snapshots.bytes,
+        per_second(snapshots.bytes)
+    );
     say!("deltas     {} in {} bytes, {:.1} kbit/s", deltas.count, deltas.bytes, per_second(deltas.bytes));
-    say!("file       {} bytes, {:.1} kbit/s", recording.size_bytes(), per_second(recording.size_bytes() as u64));
+    say!(
+        "file       {} bytes, {:.1} kbit/s",
+        recording.size_bytes(),
+        per_second(recording.size_bytes() as u64)
+    );
     let at: Vec<String> =
         recording.snapshots().iter().map(|at| format!("{:.2}", at.time_us as f64 * 1e-6)).collect();
     say!("groups     at {} s", at.join(", "));

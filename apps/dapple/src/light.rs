@@ -33,11 +33,7 @@ pub(crate) fn server_config(scene: &Scene, args: &LightArgs) -> Result<ServerCon
             seed: visibility.seed,
             ..GenerateParams::default()
         },
-        update: UpdateParams {
-            rays: visibility.point_rays,
-            radius_m,
-            threshold: visibility.threshold,
-        },
+        update: UpdateParams { rays: visibility.point_rays, radius_m, threshold: visibility.threshold },
         ..ServerConfig::default()
     })
 }

@@ -1,18 +1,21 @@
-//! The command `dapple`: evaluate, render, record, and write scenes.
+//! The command `dapple`: evaluate, render, show, record and serve scenes.
 
 #[macro_use]
 mod say;
 
 mod args;
+mod demo;
 mod eval;
 mod inspect;
 mod light;
+mod page;
 mod picture;
 mod progress;
 mod record;
 mod render;
 mod scene_command;
 mod source;
+mod view;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -42,12 +45,16 @@ fn main() -> ExitCode {
 }
 
 fn run(cli: Cli) -> anyhow::Result<()> {
+    // Windows must be opened on the program's first thread.
+    if let Command::View(args) = &cli.command {
+        return view::run(args);
+    }
     let threads = match &cli.command {
         Command::Eval(args) => args.threads,
         Command::Render(args) => args.threads,
         Command::Record(args) => args.threads,
-        Command::Quality(args) => args.threads,
-        Command::Scene(_) | Command::Inspect(_) => 0,
+Command::Quality(args) => args.threads,
+        Command::Scene(_) | Command::Inspect(_) | Command::Demo(_) | Command::View(_) => 0,
     };
     if threads > 1024 {
         anyhow::bail!("--threads is {threads}, must be 0 (one for each core) to 1024");
@@ -60,5 +67,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Scene(args) => scene_command::run(&args),
         Command::Record(args) => record::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Demo(args) => demo::run(&args),
+        Command::View(args) => view::run(&args),
     })
 }

@@ -11,7 +11,7 @@ use crate::args::{CameraText, Radius, SceneChoice, VisibilityArgs};
 use crate::progress::Bar;
 
 /// The largest scene file that is read.
-const MAX_SCENE_BYTES: u64 = 4 << 30;
+pub(crate) const MAX_SCENE_BYTES: u64 = 4 << 30;
 
 /// A loaded scene and what a user should call it.
 pub(crate) struct Loaded {

@@ -1,4 +1,4 @@
-//! Arguments of the verbs around streams: record, inspect.
+//! Arguments of the verbs around streams: record, inspect, demo.
 
 use std::path::PathBuf;
 
@@ -20,6 +20,14 @@ Examples:
   dapple inspect room.dapple
   dapple inspect room.dapple --scene room.glb            does the light belong to this scene?
   dapple inspect atrium.dapple --builtin atrium";
+
+pub(crate) const DEMO_EXAMPLES: &str = "\
+Examples:
+  dapple demo                                    the built-in atrium; make demo builds the page first
+  dapple demo --port 9000 --page target/web
+  dapple demo --detail 0.5 --points 512 --out out/large --fresh
+
+With the environment variable CI set it fetches its own page once and ends.";
 
 /// How points are laid and updated.
 #[derive(Debug, Clone, Args)]
@@ -71,4 +79,34 @@ pub(crate) struct InspectArgs {
     /// Tessellation of the built-in scene, above 0 to 1.
     #[arg(long, value_name = "D")]
     pub(crate) detail: Option<f32>,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct DemoArgs {
+    /// The built-in scene that is shown.
+    #[arg(long, value_name = "NAME", default_value = "atrium")]
+    pub(crate) builtin: String,
+    /// Its tessellation, above 0 to 1.
+    #[arg(long, value_name = "D", default_value_t = 0.25)]
+    pub(crate) detail: f32,
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
+    /// Seconds that are recorded and played round and round [default: the whole animation].
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    pub(crate) seconds: Option<f64>,
+    /// Folder of the built page [default: target/web].
+    #[arg(long, value_name = "DIR")]
+    pub(crate) page: Option<PathBuf>,
+    /// Folder that is filled and served.
+    #[arg(long, value_name = "DIR", default_value = "out/demo-page")]
+    pub(crate) out: PathBuf,
+    /// Make scene and light again, whether they are up to date or not.
+    #[arg(long)]
+    pub(crate) fresh: bool,
+    /// Address to listen on; 0.0.0.0 lets others in the network in.
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
+    pub(crate) host: String,
+    /// Port to listen on; 0 takes any [default: 8000, or the next that is free].
+    #[arg(long, value_name = "PORT")]
+    pub(crate) port: Option<u16>,
 }
