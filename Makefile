@@ -5,7 +5,7 @@ export PATH := $(PATH):$(HOME)/.cargo/bin
 
 REPORT := $(CURDIR)/out/demo
 
-.PHONY: demo test bench check fmt
+.PHONY: demo web test bench check fmt
 
 # The whole loop on the built-in scene and a report of it; then the page, served on this machine (not with CI set).
 demo:
@@ -14,6 +14,11 @@ demo:
 	@echo
 	@echo "The report: file://$(REPORT)/report.html"
 	@if [ -z "$$CI" ]; then cargo xtask wasm && cargo run --release --package dapple -- demo; fi
+
+# The page, into target/web, for any static server.
+web:
+	@bash scripts/setup.sh web
+	cargo xtask wasm
 
 # All checks and tests; what CI runs.
 test:

@@ -75,6 +75,12 @@ impl Runner {
         }
     }
 
+    /// Notes that something was left out.
+    pub(crate) fn skip(&mut self, line: &str) {
+        println!("\n{line}");
+        self.skipped.push(line.to_owned());
+    }
+
     /// Prints what was skipped, passed and failed; an error if anything failed.
     pub(crate) fn finish(self) -> Result<()> {
         println!();
@@ -120,7 +126,10 @@ impl Runner {
     }
 
     fn page(&self) -> Result<()> {
-        wasm::build(self.root(), self.metadata.target_directory.as_std_path(), |arguments| self.cargo(arguments))
+        wasm::install_driver(self.root());
+        wasm::build(self.root(), self.metadata.target_directory.as_std_path(), |arguments| {
+            self.cargo(arguments)
+        })
     }
 
     fn tests(&mut self) -> Result<()> {
@@ -144,7 +153,7 @@ impl Runner {
         let _ = std::fs::remove_file(&report);
         let outcome = self.cargo(&["nextest", "run", "--workspace", "--all-features"]);
         match std::fs::read_to_string(&report) {
-            Ok(text) => self.skipped = skipped::skipped_lines(&text),
+            Ok(text) => self.skipped.extend(skipped::skipped_lines(&text)),
             Err(error) => eprintln!("cannot list what was skipped: {}: {error}", report.display()),
         }
         outcome

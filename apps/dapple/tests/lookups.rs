@@ -12,7 +12,7 @@ use dapple_render::psao::hash::{self, PointHash};
 use dapple_render::psao::{Hat, MovingLeastSquares};
 use dapple_scene::glam::Vec3;
 use dapple_store::points::{Change, PackedNormal, PointLayout, PointSet, PointStore, morton_code};
-use fullscreen::{Bindings, Fragments, FRAGMENTS_WGSL, TARGET_FORMAT, main_wgsl, table_bindings};
+use fullscreen::{Bindings, FRAGMENTS_WGSL, Fragments, TARGET_FORMAT, main_wgsl, table_bindings};
 
 /// Largest difference of a look-up's shader from its twin: half a step of a stored value.
 const TOLERANCE: f32 = 0.5 / 255.0;
@@ -76,7 +76,10 @@ fn assert_agree(what: &str, shader: &[f32], twin: &[f32]) {
     let mean = differences.iter().map(|&d| f64::from(d)).sum::<f64>() / differences.len() as f64;
     let worst = differences.iter().copied().fold(0.0, f32::max);
     println!("{what}: {beyond} of {} beyond {TOLERANCE}, mean {mean:.2e}, worst {worst}", differences.len());
-    assert!(beyond as f64 <= AT_THRESHOLDS * differences.len() as f64, "{what}: {beyond} differ, worst {worst}");
+    assert!(
+        beyond as f64 <= AT_THRESHOLDS * differences.len() as f64,
+        "{what}: {beyond} differ, worst {worst}"
+    );
     assert!(mean < 1e-4, "{what}: mean difference {mean}");
     // Not all open: something was looked up.
     assert!(twin.iter().filter(|v| **v < 0.99).count() * 20 > twin.len(), "{what}: nothing was found");
@@ -115,13 +118,17 @@ fn check(what: &str, store: &PointStore, fragments: &[Option<RestSurface>], widt
 
     let tables = paper.make_textures(&gpu.device).unwrap();
     paper.upload(&gpu.queue, &tables);
-    let groups = [Bindings::new(), table_bindings(&tables, 0)];
+    let groups = [Bindings::new(), Bindings::new(), table_bindings(&tables, 0)];
     let pass = frame.pass("paper", &files(&hash_wgsl()), "main", &groups, TARGET_FORMAT);
-    assert_agree(&format!("{what}, paper"), &frame.run(&pass)[..fragments.len()], &paper.reconstruct(fragments));
+    assert_agree(
+        &format!("{what}, paper"),
+        &frame.run(&pass)[..fragments.len()],
+        &paper.reconstruct(fragments),
+    );
 
     let cell_tables = direct.make_textures(&gpu.device).unwrap();
     direct.upload(&gpu.queue, &cell_tables);
-    let groups = [Bindings::new(), table_bindings(&cell_tables, 3)];
+    let groups = [Bindings::new(), Bindings::new(), table_bindings(&cell_tables, 3)];
     let cells_pass = frame.pass("direct", &files(&cells_wgsl()), "main", &groups, TARGET_FORMAT);
     let twin = direct.reconstruct(fragments);
     assert_agree(&format!("{what}, direct"), &frame.run(&cells_pass)[..fragments.len()], &twin);

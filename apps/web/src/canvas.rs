@@ -1,7 +1,5 @@
 //! A canvas to draw on: a device of one of the browser's two interfaces, and what it presents.
 
-use std::sync::{Arc, Mutex};
-
 use dapple_gpu::wgpu::{self, CurrentSurfaceTexture, TextureFormat};
 use dapple_gpu::{Gpu, GpuOptions};
 use web_sys::HtmlCanvasElement;
@@ -13,8 +11,6 @@ pub(crate) struct Screen {
     pub(crate) gpu: Gpu,
     surface: wgpu::Surface<'static>,
     config: wgpu::SurfaceConfiguration,
-    /// What went wrong since the device was made, to be told at the next frame.
-    failure: Arc<Mutex<Option<String>>>,
 }
 
 impl Screen {
@@ -54,9 +50,8 @@ impl Screen {
     ) -> Result<Screen, String> {
         let formats = surface.get_capabilities(&gpu.adapter).formats;
         // The viewer encodes by itself, so that both interfaces show the same.
-        let plain = |format: &&TextureFormat| {
-            matches!(format, TextureFormat::Rgba8Unorm | TextureFormat::Bgra8Unorm)
-        };
+        let plain =
+            |format: &&TextureFormat| matches!(format, TextureFormat::Rgba8Unorm | TextureFormat::Bgra8Unorm);
         let format =
             *formats.iter().find(plain).ok_or("the canvas offers no format of 8 plain bits a channel")?;
         let config = wgpu::SurfaceConfiguration {
@@ -72,17 +67,7 @@ impl Screen {
         };
         surface.configure(&gpu.device, &config);
 
-        let failure = Arc::new(Mutex::new(None));
-        let noted = Arc::clone(&failure);
-        gpu.device.set_device_lost_callback(move |reason, message| {
-            // A device that is destroyed on purpose is lost as well.
-            if reason != wgpu::DeviceLostReason::Destroyed {
-                note(&noted, format!("the graphics card was lost: {message}"));
-            }
-        });
-        let noted = Arc::clone(&failure);
-        gpu.device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| note(&noted, error.to_string())));
-        Ok(Screen { gpu, surface, config, failure })
+        Ok(Screen { gpu, surface, config })
     }
 
     /// Format of what is drawn to.
@@ -105,11 +90,6 @@ impl Screen {
         }
     }
 
-    /// What went wrong outside any call, once.
-    pub(crate) fn take_failure(&self) -> Option<String> {
-        self.failure.lock().ok()?.take()
-    }
-
     /// Lets `draw` draw the next picture and shows it; false if the browser wants none now.
     pub(crate) fn draw<E: std::fmt::Display>(
         &self,
@@ -128,13 +108,6 @@ impl Screen {
         draw(&self.gpu, &view).map_err(|error| error.to_string())?;
         self.gpu.queue.present(texture);
         Ok(true)
-    }
-}
-
-/// Keeps the first failure: others follow from it.
-fn note(failure: &Mutex<Option<String>>, message: String) {
-    if let Ok(mut failure) = failure.lock() {
-        failure.get_or_insert(message);
     }
 }
 

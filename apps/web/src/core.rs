@@ -92,10 +92,10 @@ impl Core {
             shade.shadow_resolution = shadow_resolution.clamp(16, 8192);
         }
         let config = ViewerConfig {
-            format: self.screen.format(),
             samples: if samples == 1 { 1 } else { 4 },
             shade,
             limits: self.limits,
+            ..ViewerConfig::new(self.screen.format())
         };
         let viewer = Viewer::new(&self.screen.gpu, Arc::clone(&scene), config)?;
         self.steering = Steering::new(&scene);
@@ -136,8 +136,8 @@ impl Core {
 
     /// Plays up to `now_s` (seconds on the page's clock) and draws if anything changed; true if it drew.
     pub fn frame(&mut self, now_s: f64) -> Result<bool, JsError> {
-        if let Some(failure) = self.screen.take_failure() {
-            return Err(JsError::new(&failure));
+        if let Some(fault) = self.screen.gpu.take_fault() {
+            return Err(fault.into());
         }
         let elapsed_s = self.last_tick_s.map_or(0.0, |last| now_s - last);
         self.last_tick_s = Some(now_s);
@@ -161,7 +161,8 @@ impl Core {
         let camera = self.steering.camera(scene, self.clock.time_s());
         let (size, time_s) = (self.screen.size(), self.clock.time_s());
         let options = &self.options;
-        let drew = self.screen.draw(|gpu, target| viewer.draw(gpu, target, size, &camera, time_s, now_s, options));
+        let drew =
+            self.screen.draw(|gpu, target| viewer.draw(gpu, target, size, &camera, time_s, now_s, options));
         self.changed = false;
         if drew.map_err(|reason| JsError::new(&reason))? {
             self.pictures.add(now_s, 1.0);
@@ -245,7 +246,8 @@ impl Core {
     pub fn stats(&mut self, now_s: f64) -> JsValue {
         let stats = self.shown.as_ref().map(|shown| shown.viewer.stats()).unwrap_or_default();
         let info = self.screen.gpu.adapter.get_info();
-        let backend = if info.backend == dapple_gpu::wgpu::Backend::BrowserWebGpu { "webgpu" } else { "webgl2" };
+        let backend =
+            if info.backend == dapple_gpu::wgpu::Backend::BrowserWebGpu { "webgpu" } else { "webgl2" };
         let age_s = stats.last_frame_s.map_or(JsValue::NULL, |last| (now_s - last).max(0.0).into());
         let (heap_bytes, card_bytes) = stats.memory_bytes;
         object(&[
@@ -276,7 +278,7 @@ impl Core {
         scene.iter().flat_map(|scene| &scene.warnings).map(|warning| warning.message.clone()).collect()
     }
 
-    /// Height of the picture per width, for what is measured in heights.
+    /// Width of the picture per height.
     pub(crate) fn aspect(&self) -> f32 {
         let (width, height) = self.screen.size();
         width as f32 / height as f32

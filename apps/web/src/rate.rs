@@ -20,8 +20,9 @@ impl Rate {
     pub fn add(&mut self, now_s: f64, amount: f64) {
         self.since_s.get_or_insert(now_s);
         self.forget(now_s);
+        let full = self.entries.len() >= MAX_ENTRIES;
         match self.entries.back_mut() {
-            Some((time, sum)) if *time == now_s || self.entries.len() >= MAX_ENTRIES => {
+            Some((time, sum)) if full || *time == now_s => {
                 (*time, *sum) = (now_s, *sum + amount);
             }
             _ => self.entries.push_back((now_s, amount)),

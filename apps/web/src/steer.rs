@@ -19,6 +19,8 @@ pub(crate) struct Steering {
     yfov: f32,
     /// Metres a second ahead, to the right and up.
     speed: Vec3,
+    /// The scene's diagonal at its start, metres.
+    diagonal_m: f32,
 }
 
 #[derive(Clone, Copy)]
@@ -29,14 +31,21 @@ enum Aim {
 
 impl Default for Steering {
     fn default() -> Steering {
-        Steering { paths: Vec::new(), aim: Aim::Path(0), yfov: DEFAULT_YFOV, speed: Vec3::ZERO }
+        Steering {
+            paths: Vec::new(),
+            aim: Aim::Path(0),
+            yfov: DEFAULT_YFOV,
+            speed: Vec3::ZERO,
+            diagonal_m: 1.0,
+        }
     }
 }
 
 impl Steering {
     /// On the scene's first camera path.
     pub(crate) fn new(scene: &Scene) -> Steering {
-        Steering { paths: scene.camera_paths(), ..Steering::default() }
+        let diagonal_m = scene.bounds_world(&scene.pose(0.0)).diagonal();
+        Steering { paths: scene.camera_paths(), diagonal_m, ..Steering::default() }
     }
 
     /// How long the scene plays by itself: its animation, else its first camera path.
@@ -51,7 +60,7 @@ impl Steering {
         match (self.aim, self.paths.first()) {
             (Aim::Hand(controls), _) => controls.camera(self.yfov),
             (Aim::Path(index), Some(first)) => {
-                self.paths.get(index).unwrap_or(first).camera(scene, &scene.pose(time_s))
+                self.paths.get(index).unwrap_or(first).camera(scene, &scene.pose_undeformed(time_s))
             }
             (Aim::Path(_), None) => PosedCamera::look_at(Vec3::ONE, Vec3::ZERO, self.yfov),
         }
@@ -70,22 +79,19 @@ impl Steering {
 
     /// The reader's hand, which takes over from a path where the path is now: on foot inside the scene, around its
     /// middle from outside.
-    fn hand(&mut self, scene: &Scene, time_s: f64) -> &mut Controls {
-        if let Aim::Path(_) = self.aim {
-            let camera = self.camera(scene, time_s);
-            if let Projection::Perspective { yfov, .. } = camera.projection {
-                self.yfov = yfov;
-            }
-            let bounds = scene.bounds_world(&scene.pose(time_s));
-            let eye = camera.eye_world();
-            let inside = eye.cmpge(bounds.min).all() && eye.cmple(bounds.max).all();
-            let distance = (0.5 * (bounds.min + bounds.max)).distance(eye);
-            self.aim = Aim::Hand(Controls::from_camera(&camera, (!inside).then_some(distance)));
+    fn hand(&mut self, scene: &Scene, time_s: f64) -> Controls {
+        if let Aim::Hand(controls) = self.aim {
+            return controls;
         }
-        match &mut self.aim {
-            Aim::Hand(controls) => controls,
-            Aim::Path(_) => unreachable!("it was replaced above"),
+        let camera = self.camera(scene, time_s);
+        if let Projection::Perspective { yfov, .. } = camera.projection {
+            self.yfov = yfov;
         }
+        let bounds = scene.bounds_world(&scene.pose(time_s));
+        let eye = camera.eye_world();
+        let inside = eye.cmpge(bounds.min).all() && eye.cmple(bounds.max).all();
+        let distance = (0.5 * (bounds.min + bounds.max)).distance(eye);
+        Controls::from_camera(&camera, (!inside).then_some(distance))
     }
 }
 
@@ -140,8 +146,8 @@ impl Core {
     /// On foot (true) or around what is in front, from where the camera is.
     #[wasm_bindgen(js_name = setWalking)]
     pub fn set_walking(&mut self, walking: bool) {
-        self.by_hand(|controls, bounds_m| {
-            *controls = if walking { controls.to_walk() } else { controls.to_orbit(0.25 * bounds_m) };
+        self.by_hand(|controls, diagonal_m| {
+            *controls = if walking { controls.to_walk() } else { controls.to_orbit(0.25 * diagonal_m) };
         });
     }
 
@@ -177,7 +183,7 @@ impl Core {
             return;
         }
         let mut speed = 0.0;
-        self.by_hand(|_, bounds_m| speed = (0.1 * bounds_m).clamp(0.01, 10.0));
+        self.by_hand(|_, diagonal_m| speed = (0.1 * diagonal_m).clamp(0.01, 10.0));
         self.steering.speed = speed * direction.clamp(Vec3::NEG_ONE, Vec3::ONE);
     }
 
@@ -211,9 +217,9 @@ impl Core {
     /// Changes the controls, which take over from a path; the change learns the diagonal of the scene in metres.
     fn by_hand(&mut self, change: impl FnOnce(&mut Controls, f32)) {
         let Some(scene): Option<Arc<Scene>> = self.scene() else { return };
-        let time_s = self.clock.time_s();
-        let diagonal_m = scene.bounds_world(&scene.pose(time_s)).diagonal();
-        change(self.steering.hand(&scene, time_s), diagonal_m);
+        let mut controls = self.steering.hand(&scene, self.clock.time_s());
+        change(&mut controls, self.steering.diagonal_m);
+        self.steering.aim = Aim::Hand(controls);
         self.changed = true;
     }
 }

@@ -34,7 +34,7 @@ static SAMPLE: LazyLock<(PointStore, Vec<u8>, Vec<u8>)> = LazyLock::new(|| {
 /// Enough cuts in two sets that their sections are compressed.
 fn cuts() -> Cuts {
     let set = |instance, count: u32| {
-        let cut = |i| SiteCut { site: i * 3 + i % 2, mask: 1 << (i % 16) | 1 };
+        let cut = |i| SiteCut { site: i * 3 + i % 2, mask: 1u16 << (i % 16) | 1 };
         SetCuts { instance, sites: 3 * count + 1, fingerprint: 77, cuts: (0..count).map(cut).collect() }
     };
     Cuts::new(vec![set(0, 500), set(2, 100)]).unwrap()

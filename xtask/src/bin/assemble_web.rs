@@ -32,12 +32,19 @@ fn main() -> ExitCode {
 fn assemble(program: &Path, page: &Path, out: &Path) -> Result<()> {
     std::fs::create_dir_all(out).with_context(|| format!("cannot make {}", out.display()))?;
     let mut bindgen = Bindgen::new();
-    bindgen.input_path(program).out_name(NAME).typescript(false).remove_producers_section(true).web(true)?;
+    bindgen
+        .input_path(program)
+        .out_name(NAME)
+        .typescript(false)
+        .remove_name_section(true)
+        .remove_producers_section(true)
+        .web(true)?;
     bindgen.generate(out).with_context(|| format!("cannot make the glue of {}", program.display()))?;
     for file in std::fs::read_dir(page).with_context(|| format!("cannot list {}", page.display()))? {
         let from = file?.path();
         if let (true, Some(name)) = (from.is_file(), from.file_name()) {
-            std::fs::copy(&from, out.join(name)).with_context(|| format!("cannot copy {}", from.display()))?;
+            std::fs::copy(&from, out.join(name))
+                .with_context(|| format!("cannot copy {}", from.display()))?;
         }
     }
 
@@ -61,7 +68,8 @@ fn assemble(program: &Path, page: &Path, out: &Path) -> Result<()> {
 
 /// Runs wasm-opt where there is one; false where there is none.
 fn shrink(wasm: &Path) -> Result<bool> {
-    let found = Command::new("wasm-opt").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+    let found =
+        Command::new("wasm-opt").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
     if !found.is_ok_and(|status| status.success()) {
         return Ok(false);
     }

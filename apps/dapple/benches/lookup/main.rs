@@ -71,7 +71,11 @@ fn main() -> Result<()> {
         (width, height) = (640, 360);
     }
     let seen = View::new(arguments.detail, width, height);
-    println!("atrium, {} triangles, {width}x{height}, {} rounds", seen.scene.triangle_count(), arguments.rounds);
+    println!(
+        "atrium, {} triangles, {width}x{height}, {} rounds",
+        seen.scene.triangle_count(),
+        arguments.rounds
+    );
 
     let (mut costs, mut processor) = (Vec::new(), Value::Null);
     for &wanted in &arguments.points {
@@ -147,7 +151,7 @@ fn lay_points(seen: &View, wanted: u32) -> Result<PointStore> {
 /// Times every candidate on one store.
 fn compare(gpu: &Gpu, seen: &View, store: &PointStore, rounds: usize, repeat: u32) -> Result<Value> {
     let points = store.layout().len();
-    let (atlas, load_s) = cpu::load_atlas(&seen.scene, store);
+    let (atlas, load) = cpu::load_atlas(&seen.scene, store);
     let frame = Fragments::new(gpu.clone(), seen.gbuffer.width, &seen.fragments, &seen.charts(&atlas));
     let mut paper = PointHash::new(store.layout(), store.visibility(), Hat::default())?;
     let mut direct = PointCells::new(store.layout(), store.visibility(), MovingLeastSquares::default())?;
@@ -185,7 +189,7 @@ fn compare(gpu: &Gpu, seen: &View, store: &PointStore, rounds: usize, repeat: u3
     if let Some(fault) = gpu.take_fault() {
         bail!("{fault}");
     }
-    Ok(summary(points, load_s, &candidates, &took, f64::from(repeat)))
+    Ok(summary(points, load.wall_ms * 1e-3, &candidates, &took, f64::from(repeat)))
 }
 
 /// Every candidate must show what its twin gives: who measures nothing is fast.
@@ -231,7 +235,13 @@ fn summary(points: usize, load_s: f64, candidates: &[Candidate], took: &[Vec<Too
         let is_added = i > 0 && i < candidates.len();
         let of_wall = is_added.then(|| ratio(i, &|t| Some(t.wall_ms))).flatten();
         let of_cpu = is_added.then(|| ratio(i, &|t| t.cpu_ms)).flatten();
-        println!("  {name:<14}{:>10.2}{:>10}{:>14}{:>14}", wall(i), number(cpu(i)), number(of_wall), number(of_cpu));
+        println!(
+            "  {name:<14}{:>10.2}{:>10}{:>14}{:>14}",
+            wall(i),
+            number(cpu(i)),
+            number(of_wall),
+            number(of_cpu)
+        );
         rows.push(json!({
             "name": name, "wall_ms": wall(i), "cpu_ms": cpu(i), "of_ssao_wall": of_wall, "of_ssao_cpu": of_cpu,
         }));

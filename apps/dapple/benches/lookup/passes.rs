@@ -19,7 +19,13 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    fn main(name: &'static str, frame: &Fragments, wgsl: &[&str], expression: &str, groups: &[Bindings<'_>]) -> Self {
+    fn main(
+        name: &'static str,
+        frame: &Fragments,
+        wgsl: &[&str],
+        expression: &str,
+        groups: &[Bindings<'_>],
+    ) -> Self {
         let main = main_wgsl(expression);
         let files = [&[FRAGMENTS_WGSL], wgsl, &[main.as_str()]].concat();
         let pass = frame.pass(name, &files, "main", groups, TARGET_FORMAT);
@@ -64,8 +70,14 @@ pub(crate) fn ssao(frame: &Fragments, seen: &View, radius_m: f32) -> Candidate {
     let format = wgpu::TextureFormat::R8Unorm;
     let steps = vec![
         (frame.pass("ssao", &files, "ssao", &[textures(&[(0, &depth), (1, &normal)])], format), ao.clone()),
-        (frame.pass("blur x", &files, "blur_x", &[textures(&[(0, &depth), (2, &ao)])], format), blurred.clone()),
-        (frame.pass("blur y", &files, "blur_y", &[textures(&[(0, &depth), (2, &blurred)])], format), ao.clone()),
+        (
+            frame.pass("blur x", &files, "blur_x", &[textures(&[(0, &depth), (2, &ao)])], format),
+            blurred.clone(),
+        ),
+        (
+            frame.pass("blur y", &files, "blur_y", &[textures(&[(0, &depth), (2, &blurred)])], format),
+            ao.clone(),
+        ),
     ];
     let fetch = "@group(1) @binding(0) var occlusion: texture_2d<f32>;";
     let mut candidate = Candidate::main(
@@ -81,7 +93,10 @@ pub(crate) fn ssao(frame: &Fragments, seen: &View, radius_m: f32) -> Candidate {
 
 fn textures<'a>(textures: &[(u32, &'a wgpu::TextureView)]) -> Bindings<'a> {
     let slot = |binding| texture_entry(binding, wgpu::TextureSampleType::Float { filterable: false });
-    textures.iter().map(|&(binding, v)| (binding, (slot(binding), wgpu::BindingResource::TextureView(v)))).collect()
+    textures
+        .iter()
+        .map(|&(binding, v)| (binding, (slot(binding), wgpu::BindingResource::TextureView(v))))
+        .collect()
 }
 
 /// The calls of 16 taps, written out as shaders have them: a spiral in the hemisphere, dense near the surface.
@@ -185,7 +200,7 @@ fn look_up(
     function: &str,
     binding: u32,
 ) -> Candidate {
-    let groups = [Bindings::new(), table_bindings(tables, binding)];
+    let groups = [Bindings::new(), Bindings::new(), table_bindings(tables, binding)];
     let call = format!("{function}(f.instance, f.position_rest, f.normal_rest)");
     Candidate::main(name, frame, &[wgsl], &call, &groups)
 }

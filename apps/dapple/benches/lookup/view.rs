@@ -81,7 +81,6 @@ impl View {
     }
 }
 
-
 /// Draws every triangle of the view into rest positions, normals and depth.
 pub(crate) struct GeometryPass {
     pipeline: wgpu::RenderPipeline,
@@ -153,10 +152,7 @@ impl GeometryPass {
                     attributes: &attributes,
                 })],
             },
-            primitive: wgpu::PrimitiveState {
-                cull_mode: Some(wgpu::Face::Back),
-                ..Default::default()
-            },
+            primitive: wgpu::PrimitiveState { cull_mode: Some(wgpu::Face::Back), ..Default::default() },
             depth_stencil: Some(wgpu::DepthStencilState {
                 format: wgpu::TextureFormat::Depth32Float,
                 depth_write_enabled: Some(true),
@@ -192,7 +188,10 @@ impl GeometryPass {
             color_attachments: &[attach(&self.targets[0]), attach(&self.targets[1])],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: &self.depth,
-                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: wgpu::StoreOp::Store,
+                }),
                 stencil_ops: None,
             }),
             ..Default::default()

@@ -11,6 +11,7 @@ use dapple_scene::Scene;
 use dapple_store::charts::Cuts;
 use dapple_store::points::PointStore;
 use dapple_trace::Tracer;
+use dapple_trace::psao::cuts::find_cuts;
 use dapple_trace::psao::generate::{GenerateParams, generate_points};
 use dapple_trace::psao::update::{UpdateParams, Updater};
 use rayon::prelude::*;
@@ -45,9 +46,12 @@ struct SurfaceRow {
     points: u64,
     method: &'static str,
     all: Class,
+    /// Fronts of what stands still, and of what the animation moves.
     #[serde(rename = "static")]
     still: Class,
     movers: Class,
+    /// Backs of double-sided surfaces, which are the insides of closed ones.
+    backs: Class,
     /// Points that the paper's cells and buckets had no room for.
     #[serde(skip_serializing_if = "Option::is_none")]
     discarded: Option<u32>,
@@ -152,8 +156,9 @@ impl Run<'_> {
                     points: store.layout().len() as u64,
                     method,
                     all: class(&|_| true),
-                    still: class(&|i| !samples.moving[i]),
-                    movers: class(&|i| samples.moving[i]),
+                    still: class(&|i| !samples.places[i].back && !samples.moving[i]),
+                    movers: class(&|i| !samples.places[i].back && samples.moving[i]),
+                    backs: class(&|i| samples.places[i].back),
                     discarded,
                 });
             }
@@ -222,7 +227,9 @@ impl Run<'_> {
             let update =
                 UpdateParams { rays: visibility.point_rays, radius_m, threshold: visibility.threshold };
             let updater = Updater::new(scene, &pose, &tracer, points, update, &|_| ())?;
-            let found = find(scene, updater.store(), samples)?;
+            bar.message(&format!("cuts, N = {points_per_m2}"));
+            let cuts = find_cuts(scene, &rest_pose, &rest_tracer, updater.store().layout(), &|_| ());
+            let found = find(scene, updater.store(), &cuts, samples)?;
             take(points_per_m2, updater.store(), samples, found);
         }
         Ok(())
@@ -230,7 +237,7 @@ impl Run<'_> {
 }
 
 /// What each method makes of a store.
-fn find(scene: &Scene, store: &PointStore, samples: &Samples) -> Result<Vec<Found>> {
+fn find(scene: &Scene, store: &PointStore, cuts: &Cuts, samples: &Samples) -> Result<Vec<Found>> {
     let fragments = samples.fragments();
     let index = PointIndex::new(store.layout());
     let by_kernel = |kernel| reconstruct(&index, store.visibility(), &kernel, &fragments);
@@ -249,7 +256,8 @@ fn find(scene: &Scene, store: &PointStore, samples: &Samples) -> Result<Vec<Foun
         },
         Found { method: "hat", visibility: by_kernel(Kernel::Hat(Hat::default())), discarded: None },
         Found { method: "mls", visibility: by_kernel(Kernel::default()), discarded: None },
-        Found { method: "atlas", visibility: by_atlas(None), discarded: None },
+        Found { method: "atlas-uncut", visibility: by_atlas(None), discarded: None },
+        Found { method: "atlas", visibility: by_atlas(Some(cuts)), discarded: None },
     ])
 }
 
@@ -261,17 +269,19 @@ fn db(value: Option<f64>) -> String {
 fn surface_table(rows: &[SurfaceRow]) -> String {
     let mut text = String::new();
     if let Some(row) = rows.first() {
-        let (all, movers) = (row.all.places, row.movers.places);
-        let _ = writeln!(text, "{}: {all} places on surfaces, {movers} on movers\n", row.scene);
+        let (all, backs, movers) = (row.all.places, row.backs.places, row.movers.places);
+        let _ =
+            writeln!(text, "{}: {all} places on surfaces, {backs} on backs, {movers} on movers\n", row.scene);
     }
-    text.push_str("| N | points | method | all dB | static dB | movers dB | points discarded |\n|---|---|---|---|---|---|---|\n");
+    text.push_str("| N | points | method | all dB | static dB | movers dB | backs dB | points discarded |\n|---|---|---|---|---|---|---|---|\n");
     for row in rows {
         let SurfaceRow { points_per_m2, points, method, .. } = row;
-        let [all, still, movers] = [&row.all, &row.still, &row.movers].map(|c| db(c.psnr_db));
+        let [all, still, movers, backs] =
+            [&row.all, &row.still, &row.movers, &row.backs].map(|c| db(c.psnr_db));
         let discarded = row.discarded.map_or_else(|| "–".to_owned(), |d| d.to_string());
         let _ = writeln!(
             text,
-            "| {points_per_m2} | {points} | {method} | {all} | {still} | {movers} | {discarded} |"
+            "| {points_per_m2} | {points} | {method} | {all} | {still} | {movers} | {backs} | {discarded} |"
         );
     }
     text

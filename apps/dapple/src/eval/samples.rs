@@ -13,6 +13,8 @@ use dapple_trace::rtao::{RtaoParams, Site, trace_visibility};
 pub(super) struct Place {
     pub(super) rest: RestSurface,
     pub(super) triangle: u32,
+    /// On the side from which the triangle's vertices run clockwise.
+    pub(super) back: bool,
     /// Weights of vertices 1 and 2.
     pub(super) barycentrics: [f32; 2],
     pub(super) position_world: Vec3,
@@ -105,7 +107,7 @@ fn place(
     let in_world = indices.map(|v| world.transform_point3(vertices[v as usize]));
     let (position_world, normal_world) = on(in_world, world.matrix3.determinant() < 0.0)?;
     let rest = RestSurface { instance, position_rest, normal_rest };
-    Some(Place { rest, triangle, barycentrics, position_world, normal_world })
+    Some(Place { rest, triangle, back, barycentrics, position_world, normal_world })
 }
 
 /// Errors of one method over a class of places.

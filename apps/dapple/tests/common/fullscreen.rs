@@ -64,7 +64,12 @@ pub(crate) const TARGET_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba3
 
 impl Fragments {
     /// `charts` are four numbers a fragment for whoever needs more than the rest surface, or empty.
-    pub(crate) fn new(gpu: Gpu, width: u32, fragments: &[Option<RestSurface>], charts: &[[f32; 4]]) -> Fragments {
+    pub(crate) fn new(
+        gpu: Gpu,
+        width: u32,
+        fragments: &[Option<RestSurface>],
+        charts: &[[f32; 4]],
+    ) -> Fragments {
         let height = (fragments.len() as u32).div_ceil(width);
         let mut place = vec![[0.0f32, 0.0, 0.0, -1.0]; (width * height) as usize];
         let mut normal = vec![[0.0f32; 4]; (width * height) as usize];
@@ -76,8 +81,7 @@ impl Fragments {
             }
         }
         chart[..charts.len()].copy_from_slice(charts);
-        let views =
-            [place, normal, chart].map(|data| view(&float_texture(&gpu, width, height, &data)));
+        let views = [place, normal, chart].map(|data| view(&float_texture(&gpu, width, height, &data)));
         let entry = |binding| texture_entry(binding, wgpu::TextureSampleType::Float { filterable: false });
         let bindings: Bindings<'_> = views
             .iter()
@@ -101,7 +105,8 @@ impl Fragments {
         let device = &self.gpu.device;
         let module = shader_module(device, label, &join(files));
         let bound: Vec<_> = groups.iter().map(|b| bind(&self.gpu, b)).collect();
-        let layouts: Vec<_> = std::iter::once(&self.layout).chain(bound.iter().map(|b| &b.0)).map(Some).collect();
+        let layouts: Vec<_> =
+            std::iter::once(&self.layout).chain(bound.iter().map(|b| &b.0)).map(Some).collect();
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(label),
             bind_group_layouts: &layouts,
@@ -167,7 +172,10 @@ pub(crate) fn view(texture: &wgpu::Texture) -> wgpu::TextureView {
     texture.create_view(&Default::default())
 }
 
-pub(crate) fn texture_entry(binding: u32, sample_type: wgpu::TextureSampleType) -> wgpu::BindGroupLayoutEntry {
+pub(crate) fn texture_entry(
+    binding: u32,
+    sample_type: wgpu::TextureSampleType,
+) -> wgpu::BindGroupLayoutEntry {
     wgpu::BindGroupLayoutEntry {
         binding,
         visibility: wgpu::ShaderStages::FRAGMENT,
@@ -204,7 +212,12 @@ pub(crate) fn table_bindings(textures: &dapple_render::psao::TableTextures, firs
     (0..3).map(|i| (entries[i].binding, (entries[i], wgpu::BindingResource::TextureView(views[i])))).collect()
 }
 
-pub(crate) fn render_texture(gpu: &Gpu, width: u32, height: u32, format: wgpu::TextureFormat) -> wgpu::Texture {
+pub(crate) fn render_texture(
+    gpu: &Gpu,
+    width: u32,
+    height: u32,
+    format: wgpu::TextureFormat,
+) -> wgpu::Texture {
     use wgpu::TextureUsages as Usage;
     texture(gpu, width, height, format, Usage::RENDER_ATTACHMENT | Usage::TEXTURE_BINDING | Usage::COPY_SRC)
 }

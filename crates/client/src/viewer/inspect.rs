@@ -105,5 +105,7 @@ fn upload(
 ) -> Result<(), ForwardError> {
     let bands = (0..atlas.layers()).map(|layer| AtlasBand { layer, first_row: 0, end_row: atlas.side() });
     let bands: Vec<AtlasBand> = bands.collect();
-    gpu_scene.upload_inspection(gpu, atlas.side(), atlas.layers(), texels, &bands)
+    let area = atlas.side() as usize * atlas.side() as usize;
+    let layers: Vec<&[[u8; 2]]> = texels.chunks_exact(area).collect();
+    gpu_scene.upload_inspection(gpu, atlas.side(), &layers, &bands)
 }

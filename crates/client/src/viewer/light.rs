@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dapple_gpu::Gpu;
-use dapple_render::forward::{AtlasBand, ForwardError, GpuScene, PagePlace};
+use dapple_render::forward::{AtlasBand, ForwardError, GpuScene};
 use dapple_render::psao::atlas::{AtlasParams, PointChange, VisibilityAtlas};
 use dapple_scene::Scene;
 use dapple_stream::{Applied, ReceiveError, Subscriber, ValueChange};
@@ -16,26 +16,23 @@ pub(super) struct Light {
     pub(super) subscriber: Subscriber,
     pub(super) atlas: Option<VisibilityAtlas>,
     pub(super) inspection: Inspection,
-    /// Instances whose mesh on the card has its charts.
-    charted: Vec<bool>,
-    moves: Vec<bool>,
+    /// Whether what lies on the card is of another atlas.
+    is_new: bool,
     /// When the running fade began, seconds; long ago if none runs.
     fade_start_s: f64,
 }
 
 impl Light {
     pub(super) fn new(scene: Arc<Scene>, subscriber: Subscriber) -> Light {
-        let charted = vec![false; scene.instances.len()];
-        let moves = scene.moving_instances();
         let inspection = Inspection::default();
-        Light { scene, subscriber, atlas: None, inspection, charted, moves, fade_start_s: f64::NEG_INFINITY }
+        Light { scene, subscriber, atlas: None, inspection, is_new: false, fade_start_s: f64::NEG_INFINITY }
     }
 
     pub(super) fn receive(&mut self, bytes: &[u8], now_s: f64) -> Result<Applied, ReceiveError> {
         let applied = self.subscriber.receive(bytes)?;
         match &applied {
             Applied::NewLayout => {
-                self.charted.fill(false);
+                self.is_new = true;
                 self.inspection.reset();
                 let cuts = self.subscriber.cuts();
                 self.atlas = self.subscriber.store().map(|store| {
@@ -83,27 +80,15 @@ impl Light {
     /// Brings onto the card what changed since the last call.
     pub(super) fn upload(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene, now_s: f64) -> Result<(), ForwardError> {
         let Some(atlas) = &mut self.atlas else { return Ok(()) };
-        for instance in atlas.take_ready() {
-            let Some(charts) = atlas.charts(instance).cloned() else { continue };
-            let own = &self.scene.instances[instance as usize];
-            if !self.charted[instance as usize] {
-                // All that will have equal charts share one copy of the mesh; those not ready yet have no place, so
-                // they stay open.
-                let alike = self.scene.instances.iter().enumerate().filter(|(i, other)| {
-                    other.mesh == own.mesh
-                        && other.rest_from_mesh == own.rest_from_mesh
-                        && self.moves[*i] == self.moves[instance as usize]
-                });
-                let alike: Vec<u32> = alike.map(|(i, _)| i as u32).collect();
-                let triangles = &self.scene.meshes[own.mesh as usize].triangles;
-                gpu_scene.set_charts(gpu, &alike, &charts, &charts.vertices(triangles))?;
-                alike.iter().for_each(|&i| self.charted[i as usize] = true);
+        if std::mem::take(&mut self.is_new) {
+            for instance in 0..self.scene.instances.len() as u32 {
+                gpu_scene.set_pages(gpu, instance, &[])?;
             }
-            let place = |p: &dapple_render::psao::atlas::Placement| {
-                Some(PagePlace { layer: p.layer as u16, x: p.x as u16, y: p.y as u16 })
-            };
-            let places: Vec<Option<PagePlace>> = atlas.placements(instance).iter().map(place).collect();
-            gpu_scene.set_pages(gpu, instance, &places)?;
+        }
+        for instance in atlas.take_ready() {
+            let Some(charts) = atlas.charts(instance) else { continue };
+            gpu_scene.set_charts(gpu, instance, charts)?;
+            gpu_scene.set_pages(gpu, instance, atlas.placements(instance))?;
         }
         let dirty = atlas.take_dirty();
         let bands: Vec<AtlasBand> = dirty
@@ -111,7 +96,8 @@ impl Light {
             .map(|band| AtlasBand { layer: band.layer, first_row: band.y.start, end_row: band.y.end })
             .collect();
         if !bands.is_empty() {
-            gpu_scene.upload_atlas(gpu, atlas.side(), atlas.layers(), atlas.all_texels(), &bands)?;
+            let layers: Vec<&[[u8; 2]]> = (0..atlas.layers()).map(|layer| atlas.texels(layer)).collect();
+            gpu_scene.upload_atlas(gpu, atlas.side(), &layers, &bands)?;
             self.inspection.note(atlas, &bands, now_s);
         }
         Ok(())

@@ -10,6 +10,7 @@ mod anchors;
 mod inspect;
 mod light;
 mod options;
+mod paper;
 #[cfg(test)]
 mod tests;
 
@@ -25,6 +26,7 @@ use dapple_stream::{Applied, ReceiveError, Subscriber};
 
 use anchors::Anchors;
 use light::Light;
+use paper::PaperLookup;
 pub use options::{DebugView, DrawOptions, LoadProgress, Method, ViewerConfig, ViewerError, ViewerStats};
 
 /// One viewer's copy of the light on a graphics card, and the passes that draw with it.
@@ -35,6 +37,7 @@ pub struct Viewer {
     gpu_scene: GpuScene,
     forward: Forward,
     transparency: Transparency,
+    paper: PaperLookup,
     points: Option<PointsShown>,
     stats: ViewerStats,
     /// The caller's clock and the fade when it last drew.
@@ -60,13 +63,14 @@ impl Viewer {
         limits.max_sets = limits.max_sets.max(u32::try_from(scene.instances.len()).unwrap_or(u32::MAX));
         let subscriber = Subscriber::new(Some(scene.hash().0), limits);
         let gpu_scene = GpuScene::new(gpu, scene.clone(), &GpuSceneOptions { mips: config.mips })?;
-        let forward = Forward::new(gpu, config.format.remove_srgb_suffix(), config.samples, &[])?;
+        let forward = Forward::new(gpu, config.format.remove_srgb_suffix(), config.samples, &[PaperLookup::lookup(gpu)])?;
         Ok(Viewer {
             light: Light::new(scene.clone(), subscriber),
             scene,
             gpu_scene,
             forward,
             transparency: Transparency::Blend,
+            paper: PaperLookup::default(),
             points: None,
             stats: ViewerStats::default(),
             now_s: 0.0,
@@ -89,8 +93,12 @@ impl Viewer {
         self.stats.last_frame_s = Some(now_s);
         self.stats.points = self.store().map_or(0, |store| store.layout().len() as u32);
         match &applied {
-            Applied::Changes(changes) => self.stats.changed = changes.len() as u32,
+            Applied::Changes(changes) => {
+                self.stats.changed = changes.len() as u32;
+                self.paper.apply(changes);
+            }
             Applied::NewLayout => {
+                self.paper.forget();
                 self.stats.changed = self.stats.points;
                 self.points = None;
             }
@@ -125,6 +133,10 @@ impl Viewer {
     ) -> Result<(), ViewerError> {
         (self.now_s, self.fade_s) = (now_s, options.fade_s);
         self.light.upload(gpu, &mut self.gpu_scene, now_s)?;
+        let methods = [Some(options.method), options.split.map(|(_, method)| method)];
+        if methods.contains(&Some(Method::PsaoPaper)) {
+            self.paper.prepare(gpu, &mut self.forward, self.light.subscriber.store())?;
+        }
         let wants_points = options.view == DebugView::Points;
         // Only where points are shown must the processor know where deforming meshes are.
         let pose = if wants_points { self.scene.pose(scene_time_s) } else { self.scene.pose_undeformed(scene_time_s) };
@@ -202,7 +214,7 @@ fn lookup(method: Method) -> LookupId {
     match method {
         Method::None => LookupId::NONE,
         Method::Psao => LookupId::ATLAS,
-        Method::PsaoPaper => LookupId::added(0),
+        Method::PsaoPaper => paper::ID,
     }
 }
 

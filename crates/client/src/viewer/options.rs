@@ -139,6 +139,6 @@ pub enum ViewerError {
     #[error(transparent)]
     Fault(#[from] GpuFault),
     /// The points do not fit the paper's structure.
-    #[error("the paper's look-up: {0}")]
+    #[error(transparent)]
     Tables(#[from] dapple_render::psao::TableError),
 }

@@ -1,143 +1,21 @@
 //! One frame: shadow maps, then all views of it in one pass.
 
 use dapple_gpu::{Gpu, wgpu};
-use dapple_scene::{AlphaMode, Pose, PosedCamera, Projection};
-use glam::{DMat4, DVec3, Mat4, Vec3};
+use dapple_scene::AlphaMode;
 
 use super::ForwardError;
+use super::inputs::{Drawn, FrameInputs, Transparency, View, ViewKind};
 use super::layouts::{self, Growing};
 use super::lookup::{Lookup, LookupId, built_in};
 use super::pipelines::{CasterPipelines, DEPTH_FORMAT, PipelineKey, Pipelines};
-use super::points::GpuPoints;
 use super::scene::{CHARTS_SLOT, DETAIL_SLOT, GEOMETRY_SLOT, GpuScene, INSTANCE_SLOT, is_outside};
 use super::shadow::{FrameLights, ShadowAtlas, runs};
 use super::uniforms::{FrameUniform, InstanceRaw, LightsUniform};
-use crate::compose::{BACKGROUND_RGB8, PointsView};
+use super::view::{ViewCamera, background, frame_uniform, inspection_background};
 use crate::gbuffer::check_scene;
-use crate::image::{ToneCurve, ToneMap};
-use crate::projection;
-use crate::shade::{Ambient, ShadeParams};
 
 /// Bytes between the uniforms of two views.
 const FRAME_STRIDE: usize = 256;
-
-/// What a view shows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum ViewKind {
-    /// The lit scene.
-    #[default]
-    Beauty,
-    /// Visibility as gray without an sRGB curve, white is open.
-    Visibility,
-    /// Shading normals in the world as colours.
-    Normal,
-    /// The points over a dimmed lit scene, in the shade of their values (see [`View::points`]).
-    Points,
-    /// Texels of the atlas: charts in different colours, shaded by visibility.
-    Texels,
-    /// Of each texel how much the heaviest point weighs (red) and how many there are (green).
-    Weights,
-    /// Time since the value of a texel last changed: yellow is new.
-    Age,
-    /// Absolute difference of this view's look-up and another's.
-    Error {
-        /// The other.
-        other: LookupId,
-    },
-}
-
-impl ViewKind {
-    /// `VIEW_` constant of `frame.wgsl`.
-    fn code(self) -> u32 {
-        match self {
-            ViewKind::Beauty | ViewKind::Points => 0,
-            ViewKind::Visibility | ViewKind::Error { .. } => 1,
-            ViewKind::Normal => 2,
-            ViewKind::Texels => 3,
-            ViewKind::Weights => 4,
-            ViewKind::Age => 5,
-        }
-    }
-
-    fn is_lit(self) -> bool {
-        matches!(self, ViewKind::Beauty | ViewKind::Points)
-    }
-}
-
-/// How materials are drawn whose alpha is blended.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Transparency {
-    /// Mixed with what is behind, from back to front by the instances' centres, after all else.
-    #[default]
-    Blend,
-    /// Cut out where alpha is below one half, as the twin does.
-    Cutout,
-}
-
-/// A part of the picture, pixels from the top left.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Rect {
-    /// First column.
-    pub x: u32,
-    /// First row.
-    pub y: u32,
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-}
-
-/// One look at the scene: a picture has one, two side by side, or one over a part of another.
-#[derive(Clone, Copy, Debug)]
-pub struct View<'a> {
-    /// From where.
-    pub camera: PosedCamera,
-    /// The part of the picture that the camera's picture fills; the whole by default.
-    pub viewport: Option<Rect>,
-    /// The part of the picture that may change; the viewport by default.
-    pub scissor: Option<Rect>,
-    /// What is shown.
-    pub kind: ViewKind,
-    /// How visibility is found.
-    pub lookup: LookupId,
-    /// What [`ViewKind::Points`] shows.
-    pub points: Option<&'a GpuPoints>,
-}
-
-impl View<'_> {
-    /// The lit scene over the whole picture.
-    pub fn new(camera: PosedCamera, lookup: LookupId) -> View<'static> {
-        View { camera, viewport: None, scissor: None, kind: ViewKind::Beauty, lookup, points: None }
-    }
-}
-
-/// What one frame shows.
-#[derive(Clone, Copy, Debug)]
-pub struct FrameInputs<'a> {
-    /// The scene's pose; [`dapple_scene::Scene::pose_undeformed`] suffices.
-    pub pose: &'a Pose,
-    /// Lights, ambient, shadow maps.
-    pub shade: &'a ShadeParams,
-    /// Radiance to display.
-    pub tone_map: ToneMap,
-    /// Of materials whose alpha is blended.
-    pub transparency: Transparency,
-    /// From old values of visibility (0) to new ones (1).
-    pub fade: f32,
-    /// In the order they are drawn, at least one. All share the background of the first.
-    pub views: &'a [View<'a>],
-}
-
-/// What a frame came to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Drawn {
-    /// Draw calls of the picture (not of shadow maps).
-    pub draws: u32,
-    /// Triangles handed to the card for the picture, before clipping.
-    pub triangles: u64,
-    /// Lights that were left out because there are more than [`super::MAX_LIGHTS`].
-    pub ignored_lights: u32,
-}
 
 /// The forward pass for one format of target. Keeps what it makes from frame to frame.
 #[derive(Debug)]
@@ -578,116 +456,4 @@ fn frame_group(
         wgpu::BindingResource::Sampler(&shadows.sampler),
     ];
     layouts::group(&gpu.device, layout, &resources)
-}
-
-fn inspection_background() -> wgpu::Color {
-    let [r, g, b] = BACKGROUND_RGB8.map(|c| f64::from(c) / 255.0);
-    wgpu::Color { r, g, b, a: 1.0 }
-}
-
-/// What is seen where there is no surface, as displayed.
-fn background(inputs: &FrameInputs<'_>) -> wgpu::Color {
-    let kind = inputs.views.first().map_or(ViewKind::Beauty, |view| view.kind);
-    if !kind.is_lit() {
-        return inspection_background();
-    }
-    let dim = f64::from(dim(kind));
-    let [r, g, b] = inputs.tone_map.map(inputs.shade.background).to_array().map(|linear| {
-        let linear = f64::from(linear);
-        let code =
-            if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055 };
-        code * dim
-    });
-    wgpu::Color { r, g, b, a: 1.0 }
-}
-
-fn dim(kind: ViewKind) -> f32 {
-    if kind == ViewKind::Points { PointsView::default().dim } else { 1.0 }
-}
-
-fn frame_uniform(
-    inputs: &FrameInputs<'_>,
-    view: &View<'_>,
-    camera: &ViewCamera,
-    light_count: u32,
-) -> FrameUniform {
-    let shade = inputs.shade;
-    let (sky, ground) = match shade.ambient {
-        Ambient::Constant(radiance) => (radiance, radiance),
-        Ambient::Hemisphere { sky, ground } => (sky, ground),
-    };
-    let radius_px = PointsView::default().radius_px;
-    let viewport = camera.viewport;
-    FrameUniform {
-        clip_from_relative: camera.clip_from_relative.to_cols_array_2d(),
-        eye_world: camera.eye_world.to_array(),
-        view: view.kind.code(),
-        axis_world: camera.axis_world.to_array(),
-        is_parallel: u32::from(camera.is_parallel),
-        ambient_sky: sky.to_array(),
-        exposure: inputs.tone_map.exposure,
-        ambient_ground: ground.to_array(),
-        tone_curve: match inputs.tone_map.curve {
-            ToneCurve::Clamp => 0,
-            ToneCurve::Reinhard => 1,
-            ToneCurve::Filmic => 2,
-        },
-        fade: inputs.fade.clamp(0.0, 1.0),
-        specular: u32::from(shade.specular),
-        light_count,
-        dim: dim(view.kind),
-        point_half: [radius_px / viewport.width as f32, radius_px / viewport.height as f32],
-        point_half_m: radius_px * camera.pixel_m,
-        pad: 0.0,
-    }
-}
-
-/// A view's camera as the pass uses it.
-struct ViewCamera {
-    index: u32,
-    viewport: Rect,
-    clip_from_world: Mat4,
-    clip_from_relative: Mat4,
-    eye_world: Vec3,
-    axis_world: Vec3,
-    is_parallel: bool,
-    /// Metres a pixel at distance 1 (perspective) or anywhere (parallel).
-    pixel_m: f32,
-}
-
-impl ViewCamera {
-    fn new(view: &View<'_>, index: u32, size: (u32, u32)) -> Result<ViewCamera, ForwardError> {
-        let viewport = view.viewport.unwrap_or(Rect { x: 0, y: 0, width: size.0, height: size.1 });
-        let camera = &view.camera;
-        let clip_from_world = projection::clip_from_world(camera, viewport.width, viewport.height)?;
-        let eye_world = camera.eye_world();
-        let eye = DVec3::new(f64::from(eye_world.x), f64::from(eye_world.y), f64::from(eye_world.z));
-        let (is_parallel, half) = match camera.projection {
-            Projection::Perspective { yfov, .. } => (false, libm::tanf(0.5 * yfov)),
-            Projection::Orthographic { half_height, .. } => (true, half_height),
-        };
-        Ok(ViewCamera {
-            index,
-            viewport,
-            clip_from_world: clip_from_world.as_mat4(),
-            clip_from_relative: (clip_from_world * DMat4::from_translation(eye)).as_mat4(),
-            eye_world,
-            axis_world: camera.world_from_view.transform_vector3(Vec3::Z).normalize_or_zero(),
-            is_parallel,
-            pixel_m: 2.0 * half / viewport.height as f32,
-        })
-    }
-
-    /// How far away a place is, metres.
-    fn distance(&self, world: Vec3) -> f32 {
-        let offset = self.eye_world - world;
-        if self.is_parallel { offset.dot(self.axis_world) } else { offset.length() }
-    }
-
-    fn apply(&self, pass: &mut wgpu::RenderPass<'_>, view: &View<'_>) {
-        let v = self.viewport;
-        pass.set_viewport(v.x as f32, v.y as f32, v.width as f32, v.height as f32, 0.0, 1.0);
-        let s = view.scissor.unwrap_or(v);
-        pass.set_scissor_rect(s.x, s.y, s.width, s.height);
-    }
 }

@@ -6,6 +6,7 @@
 mod atlas;
 mod draw;
 mod error;
+mod inputs;
 mod layouts;
 mod lookup;
 mod pipelines;
@@ -15,10 +16,12 @@ mod shadow;
 #[cfg(test)]
 mod tests;
 mod uniforms;
+mod view;
 
 pub use atlas::{AtlasBand, AtlasTexture};
-pub use draw::{Drawn, Forward, FrameInputs, Rect, Transparency, View, ViewKind};
+pub use draw::Forward;
 pub use error::ForwardError;
+pub use inputs::{Drawn, FrameInputs, Rect, Transparency, View, ViewKind};
 pub use lookup::{LOOKUP_INPUT_WGSL, Lookup, LookupId};
 pub use points::GpuPoints;
 pub use scene::{GpuScene, GpuSceneOptions};

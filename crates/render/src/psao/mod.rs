@@ -4,8 +4,8 @@
 
 pub mod atlas;
 pub mod cells;
-mod hat;
 pub mod hash;
+mod hat;
 mod index;
 mod mls;
 mod tables;

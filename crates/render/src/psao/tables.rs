@@ -102,7 +102,11 @@ pub(super) struct VirtualGrid {
 
 impl VirtualGrid {
     /// Around a set's points, with cells of `edge_m`; without slots yet.
-    pub(super) fn around(set: &PointSet, layout: &PointLayout, edge_m: f32) -> Result<VirtualGrid, TableError> {
+    pub(super) fn around(
+        set: &PointSet,
+        layout: &PointLayout,
+        edge_m: f32,
+    ) -> Result<VirtualGrid, TableError> {
         let mut grid = VirtualGrid { origin_rest: set.origin_rest, dims: [1; 3], first: 0, count: 0 };
         let most = (0..set.len())
             .map(|i| grid.position_cells(set.position_rest(i, layout.quantum_m()), edge_m))
@@ -189,7 +193,10 @@ mod gpu {
     }
 
     impl TableTextures {
-        pub(in crate::psao) fn new(device: &wgpu::Device, tables: &Tables) -> Result<TableTextures, TableError> {
+        pub(in crate::psao) fn new(
+            device: &wgpu::Device,
+            tables: &Tables,
+        ) -> Result<TableTextures, TableError> {
             let limit = device.limits().max_texture_dimension_2d;
             let make = |texels: &Texels, label| {
                 let rows = texels.data.len().div_ceil(TABLE_WIDTH).max(1) as u32;
@@ -198,7 +205,11 @@ mod gpu {
                 }
                 Ok(device.create_texture(&wgpu::TextureDescriptor {
                     label: Some(label),
-                    size: wgpu::Extent3d { width: TABLE_WIDTH as u32, height: rows, depth_or_array_layers: 1 },
+                    size: wgpu::Extent3d {
+                        width: TABLE_WIDTH as u32,
+                        height: rows,
+                        depth_or_array_layers: 1,
+                    },
                     mip_level_count: 1,
                     sample_count: 1,
                     dimension: wgpu::TextureDimension::D2,

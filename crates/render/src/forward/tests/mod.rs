@@ -2,5 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
 mod agreement;
+mod atlas;
 mod harness;
+mod motion;
 mod shaders;
+mod views;

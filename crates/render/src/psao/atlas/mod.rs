@@ -18,10 +18,12 @@ use dapple_store::charts::{
 };
 use dapple_store::points::PointLayout;
 
-pub use pages::{DirtyBand, Placement};
+pub use dapple_store::charts::Placement;
+pub use pages::DirtyBand;
+pub use upload::TexelInfo;
+
 use pages::{Pages, PlacedPages};
 use resolve::{Builder, PointTexels, Sums, add_values};
-pub use upload::TexelInfo;
 
 /// How an atlas is made. Cuts fit only the default texel sizes and kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -239,7 +241,7 @@ impl VisibilityAtlas {
         let charts = match same {
             Some(charts) => charts,
             None => {
-                match ChartSet::new(&scene.rest_positions(instance_index as usize), &mesh.triangles, &params)
+                match ChartSet::new(&key.positions_rest(&mesh.positions), &mesh.triangles, &key.params(&defaults))
                 {
                     Ok(charts) => Arc::new(charts),
                     Err(error) => {

@@ -1,11 +1,11 @@
 // Moving least squares a fragment, over static lists of points in cells (see mls.rs for the fit).
 
 // (edge, radius, plane, log2 of the normals' power), (instances), then (origin, first slot), (cells along axes, slots).
-@group(2) @binding(3) var cells_grids: texture_2d<u32>;
+@group(3) @binding(3) var cells_grids: texture_2d<u32>;
 // (cell's number, first point, number of points, 0), free where there are no points; open addressing.
-@group(2) @binding(4) var cells_slots: texture_2d<u32>;
+@group(3) @binding(4) var cells_slots: texture_2d<u32>;
 // (position, 16 bits of normal and 8 of visibility).
-@group(2) @binding(5) var cells_points: texture_2d<u32>;
+@group(3) @binding(5) var cells_points: texture_2d<u32>;
 
 // Weighted sums of value = a + b u + c v, and what serves where they are empty.
 struct CellsFit {

@@ -13,7 +13,7 @@ use dapple_store::points::{Change, PointLayout};
 use super::MovingLeastSquares;
 use super::tables::{TableError, Tables, Texels, VirtualGrid, check_count, empty_grids, grid_texels};
 
-/// The function `cells_visibility` and its bindings (group 2, bindings 3 to 5), to be joined with a shader.
+/// The function `cells_visibility` and its bindings (group 3, bindings 3 to 5), to be joined with a shader.
 pub const WGSL: &str = include_str!("cells.wgsl");
 
 /// Points sorted by cell, found through a table with open addressing.

@@ -35,7 +35,9 @@ fn corner() -> (PointLayout, Vec<u8>) {
 fn fragments() -> Vec<Option<RestSurface>> {
     (0..3000u32)
         .map(|i| {
-            let r = |k: u32| (i.wrapping_mul(97).wrapping_add(k).wrapping_mul(2_654_435_761) >> 8) as f32 / 16_777_216.0;
+            let r = |k: u32| {
+                (i.wrapping_mul(97).wrapping_add(k).wrapping_mul(2_654_435_761) >> 8) as f32 / 16_777_216.0
+            };
             let axis = i as usize % 3;
             let mut offset = Vec3::new(r(1), r(2), r(3)) * 2.0;
             offset[axis] = r(4) * 0.03;
@@ -54,7 +56,8 @@ fn they_agree_with_moving_least_squares() {
     let index = PointIndex::new(&layout);
     let reference = reconstruct(&index, &values, &Kernel::MovingLeastSquares(mls), &fragments());
     // The lone floor has no wall: fragments of walls there have no weight, and there alone the two may differ.
-    let fitted = fragments().into_iter().map(|f| f.is_some_and(|f| f.instance == 1 || f.normal_rest == Vec3::Y));
+    let fitted =
+        fragments().into_iter().map(|f| f.is_some_and(|f| f.instance == 1 || f.normal_rest == Vec3::Y));
     let mut compared = 0;
     for ((a, b), fitted) in direct.iter().zip(&reference).zip(fitted) {
         if fitted {

@@ -21,7 +21,9 @@ impl PointCells {
     /// Visibility 0 … 1 of a fragment: the fit of [`crate::psao::MovingLeastSquares`], or the nearest point of the
     /// cells that the kernel reaches, or 1.
     pub fn visibility(&self, fragment: &RestSurface) -> f32 {
-        let Some(grid) = self.grids.get(fragment.instance as usize).filter(|g| g.count > 0) else { return 1.0 };
+        let Some(grid) = self.grids.get(fragment.instance as usize).filter(|g| g.count > 0) else {
+            return 1.0;
+        };
         let position = grid.position_cells(fragment.position_rest, self.edge_m);
         let (tangent, bitangent) = fragment.normal_rest.any_orthonormal_pair();
         let mut fit = Fit::new();

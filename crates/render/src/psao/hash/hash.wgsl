@@ -1,11 +1,11 @@
 // The paper's look-up of visibility at points in a hash table of cells ([Neff2023] sec. 3.2, 3.5, eq. 1 to 4).
 
 // (edge, radius, T_n, T_d), (instances), then (origin, first bucket), (cells along axes, buckets) an instance.
-@group(2) @binding(0) var hash_grids: texture_2d<u32>;
+@group(3) @binding(0) var hash_grids: texture_2d<u32>;
 // Two texels a bucket: eight cells + 1, 0 at the end.
-@group(2) @binding(1) var hash_buckets: texture_2d<u32>;
+@group(3) @binding(1) var hash_buckets: texture_2d<u32>;
 // Two texels a cell: seven packed points, and the cell's number in its grid.
-@group(2) @binding(2) var hash_cells: texture_2d<u32>;
+@group(3) @binding(2) var hash_cells: texture_2d<u32>;
 
 // Texel of a table that is 2048 wide.
 fn hash_at(index: u32) -> vec2u {

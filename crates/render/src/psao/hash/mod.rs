@@ -18,7 +18,7 @@ pub const CELL_POINTS: usize = 7;
 /// Entries in a bucket ([Neff2023] sec. 3.2).
 pub const BUCKET_CELLS: usize = 8;
 
-/// The function `hash_visibility` and its bindings (group 2, bindings 0 to 2), to be joined with a shader.
+/// The function `hash_visibility` and its bindings (group 3, bindings 0 to 2), to be joined with a shader.
 pub const WGSL: &str = include_str!("hash.wgsl");
 
 /// Points that found no place. The paper discards them and so does this; nothing else fails.
@@ -130,6 +130,19 @@ impl PointHash {
         super::TableTextures::new(device, &self.tables)
     }
 
+    /// How the forward pass looks up in these tables. Its group 3 binds the views of [`super::TableTextures`] as 0, 1, 2.
+    pub fn lookup(device: &dapple_gpu::wgpu::Device) -> crate::forward::Lookup {
+        let entries = super::TableTextures::layout_entries(0);
+        let descriptor =
+            dapple_gpu::wgpu::BindGroupLayoutDescriptor { label: Some("the paper's look-up"), entries: &entries };
+        crate::forward::Lookup {
+            label: "the paper's look-up",
+            wgsl: vec![WGSL, include_str!("lookup.wgsl")],
+            needs_rest: true,
+            layout: Some(device.create_bind_group_layout(&descriptor)),
+        }
+    }
+
     /// Writes what changed since the last call.
     pub fn upload(&mut self, queue: &dapple_gpu::wgpu::Queue, textures: &super::TableTextures) {
         textures.upload(queue, &mut self.tables);
@@ -163,7 +176,8 @@ impl Builder {
     fn add(&mut self, grid: &VirtualGrid, cell: [u32; 3], point: usize, word: u32) {
         let key = grid.key(cell);
         let bucket = &mut self.buckets[bucket_of(grid, cell) as usize];
-        let at = bucket.iter().position(|&entry| entry == 0 || self.cells[entry as usize - 1][CELL_POINTS] == key);
+        let at =
+            bucket.iter().position(|&entry| entry == 0 || self.cells[entry as usize - 1][CELL_POINTS] == key);
         let Some(at) = at else {
             self.overflow.bucket += 1;
             return;

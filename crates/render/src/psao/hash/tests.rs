@@ -61,11 +61,13 @@ fn cells_that_find_their_bucket_full_are_counted() {
 #[test]
 fn it_is_the_hat_up_to_the_quantised_positions() {
     let layout = floor();
-    let values: Vec<u8> = (0..layout.len()).map(|i| 100 + (layout.sets()[0].positions[i][0] / 8) as u8).collect();
+    let values: Vec<u8> =
+        (0..layout.len()).map(|i| 100 + (layout.sets()[0].positions[i][0] / 8) as u8).collect();
     let paper = PointHash::new(&layout, &values, Hat::default()).unwrap();
     assert_eq!(paper.overflow(), Overflow::default());
-    let fragments: Vec<_> =
-        (0..300).map(|i| Some(at(&layout, i as f32 * 0.06 + 0.5, 0.02, (i * 7 % 300) as f32 * 0.06 + 0.5))).collect();
+    let fragments: Vec<_> = (0..300)
+        .map(|i| Some(at(&layout, i as f32 * 0.06 + 0.5, 0.02, (i * 7 % 300) as f32 * 0.06 + 0.5)))
+        .collect();
     let index = PointIndex::new(&layout);
     let reference = reconstruct(&index, &values, &Kernel::Hat(Hat::default()), &fragments);
     for (a, b) in paper.reconstruct(&fragments).iter().zip(&reference) {

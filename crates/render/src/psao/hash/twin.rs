@@ -10,7 +10,9 @@ use crate::psao::tables::VirtualGrid;
 impl PointHash {
     /// Visibility 0 … 1 of a fragment ([Neff2023] eq. 4): 1 where no point has weight.
     pub fn visibility(&self, fragment: &RestSurface) -> f32 {
-        let Some(grid) = self.grids.get(fragment.instance as usize).filter(|g| g.count > 0) else { return 1.0 };
+        let Some(grid) = self.grids.get(fragment.instance as usize).filter(|g| g.count > 0) else {
+            return 1.0;
+        };
         let position = grid.position_cells(fragment.position_rest, self.edge_m);
         let mut sums = [0.0f32; 2];
         for cell in grid.nearest_cells(position) {
