@@ -9,7 +9,7 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
 
-pub(crate) use view::{Preset, ViewArgs, ViewKind, ViewMethod};
+pub(crate) use view::{Preset, ViewArgs, ViewKind};
 pub(crate) use watch::{DemoArgs, InspectArgs, LightArgs, RecordArgs};
 
 /// Ray-traced ambient visibility, computed once on a server and streamed to thin clients.

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use dapple_client::viewer::{DebugView, Method, ViewerError};
-use dapple_gpu::{GpuFault, wgpu};
+use dapple_gpu::GpuFault;
 use dapple_scene::glam::Vec3;
 use winit::event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent};
 use winit::event_loop::ActiveEventLoop;
