@@ -98,7 +98,7 @@ impl Overlay {
         if self.notice.is_none() && preparing.is_none() && self.failure.is_none() {
             return;
         }
-        egui::Area::new(egui::Id::new("messages"))
+        egui::Area::new(egui::Id::unique("messages"))
             .anchor(Align2::CENTER_TOP, vec2(0.0, 8.0))
             .interactable(false)
             .show(ctx, |ui| {
@@ -226,7 +226,7 @@ fn divider(ctx: &Context, show: &mut Show) {
     let mut screen = ctx.content_rect();
     screen.max.y = (screen.max.y - BELOW).max(screen.min.y);
     let x = screen.left() + *part * screen.width();
-    let area = egui::Area::new(egui::Id::new("divider"))
+    let area = egui::Area::new(egui::Id::unique("divider"))
         .fixed_pos(egui::pos2(x - 0.5 * HANDLE, screen.top()))
         .constrain(false);
     area.show(ctx, |ui| {
