@@ -44,6 +44,7 @@ fn get(port: u16, path: &str, headers: &str) -> (u16, String, Vec<u8>) {
 }
 
 /// Starts the demo without `CI` and waits for its address.
+#[allow(clippy::zombie_processes, reason = "the caller waits; on the other way out the test fails")]
 fn start(at: &Path, arguments: &[&str]) -> (Child, BufReader<std::process::ChildStdout>, u16) {
     let mut child = dapple(at, arguments).env_remove("CI").stdout(Stdio::piped()).spawn().unwrap();
     let mut out = BufReader::new(child.stdout.take().unwrap());

@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use dapple_metrics::{PIXELS_PER_DEGREE, flip};
 use serde_json::{Value, json};
 
-use scenes::{HEIGHT, Shot, WIDTH, prepare};
+use scenes::{HEIGHT, Shot, WIDTH, YFOV_DEGREES, prepare_hall, prepare_walker};
 
 /// What the tests need and a machine may lack.
 struct Tools {
@@ -109,7 +109,7 @@ fn look(shot: &Shot) -> String {
         "viewer.setCamera({{ eye: {}, target: {}, yfovDegrees: {} }}); viewer.seek({});",
         place(shot.eye),
         place(shot.target),
-        shot.yfov_degrees,
+        YFOV_DEGREES,
         shot.time_s
     )
 }
@@ -118,38 +118,38 @@ fn look(shot: &Shot) -> String {
 fn the_page_shows_what_the_twin_shows() {
     let Some(tools) = tools() else { return };
     let folder = folder("browser-pictures");
-    let prepared = prepare(&folder);
+    let scenes: Vec<_> = std::iter::once(prepare_hall(&folder)).chain(prepare_walker(&folder)).collect();
     let mut pages = Vec::new();
-    for backend in ["webgpu", "webgl2"] {
+    let mut expected = Vec::new();
+    for prepared in scenes {
         for shot in &prepared.shots {
-            pages.push(json!({
-                "name": format!("{}-{backend}", shot.name),
-                "query": format!(
-                    "?scene=data/scene.glb&stream=data/stream.dapple&paused=1&fade=0&backend={backend}"
-                ),
-                "width": WIDTH, "height": HEIGHT,
-                "script": look(shot),
-            }));
+            for backend in ["webgpu", "webgl2"] {
+                pages.push(json!({
+                    "name": format!("{}-{backend}", shot.name),
+                    "query": format!("{}&paused=1&fade=0&backend={backend}", prepared.query()),
+                    "width": WIDTH, "height": HEIGHT,
+                    "script": look(shot),
+                }));
+                expected.push((shot, backend));
+            }
         }
     }
     let reports = drive(&tools, &folder, &pages, None);
-    for (report, backend) in reports.iter().zip(["webgpu", "webgpu", "webgl2", "webgl2"]) {
+    assert_eq!(reports.len(), expected.len());
+    for (report, (shot, backend)) in reports.iter().zip(expected) {
         assert_quiet(report);
         assert_eq!(report["stats"]["backend"], backend, "{report:#}");
-        assert_eq!(report["stats"]["playing"], false);
-    }
-    for shot in &prepared.shots {
-        for backend in ["webgpu", "webgl2"] {
-            let name = format!("{}-{backend}", shot.name);
-            let page = picture(&folder, &name);
-            let [lit, open] = [&shot.lit, &shot.open].map(|twin| difference(twin, &page));
-            println!("{name}: FLIP {lit:.4} to the twin, {open:.4} to the twin without occlusion");
-            assert!(lit <= 0.05, "{name} differs from the twin by FLIP {lit:.4}");
-            assert!(
-                lit < open,
-                "{name} is no nearer to the twin with occlusion ({lit:.4}) than without ({open:.4})"
-            );
-        }
+        assert_eq!(report["stats"]["playing"], false, "{report:#}");
+        assert_eq!(report["stats"]["time"], shot.time_s, "{report:#}");
+        let name = format!("{}-{backend}", shot.name);
+        let page = picture(&folder, &name);
+        let [lit, open] = [&shot.lit, &shot.open].map(|twin| difference(twin, &page));
+        println!("{name}: FLIP {lit:.4} to the twin, {open:.4} to the twin without occlusion");
+        assert!(lit <= 0.05, "{name} differs from the twin by FLIP {lit:.4}");
+        assert!(
+            lit < open,
+            "{name} is no nearer to the twin with occlusion ({lit:.4}) than without ({open:.4})"
+        );
     }
 }
 
@@ -157,28 +157,22 @@ fn the_page_shows_what_the_twin_shows() {
 fn it_fits_a_window_and_a_phone() {
     let Some(tools) = tools() else { return };
     let folder = folder("browser-windows");
-    let prepared = prepare(&folder);
-    std::fs::write(
-        folder.join("viewer.json"),
-        json!({ "scene": "data/scene.glb", "stream": "data/stream.dapple" }).to_string(),
-    )
-    .expect("viewer.json is written");
+    let prepared = prepare_hall(&folder);
     let pages = [
         json!({
             "name": "window", "width": 1280, "height": 720, "shot": true,
-            "query": "?scene=data/scene.glb&stream=data/stream.dapple&paused=1&shadowResolution=512&maxPixelRatio=0.5&split=0.5&other=none",
+            "query": prepared.query() + "&paused=1&shadowResolution=512&maxPixelRatio=0.5&split=0.5&other=none",
             "script": look(&prepared.shots[1]),
         }),
         json!({
             "name": "phone", "width": 390, "height": 844, "phone": true, "shot": true,
-            "query": "?scene=data/scene.glb&stream=data/stream.dapple&backend=webgl2&paused=1&shadowResolution=512",
+            "query": prepared.query() + "&paused=1&shadowResolution=512&backend=webgl2",
             "script": look(&prepared.shots[0]),
         }),
     ];
     for report in drive(&tools, &folder, &pages, None) {
         assert_quiet(&report);
         assert!(report["stats"]["points"].as_u64() > Some(0), "{report:#}");
-        // Time stands still, and the loop has not come round.
         assert_eq!(report["stats"]["playing"], false);
     }
 }
@@ -187,7 +181,7 @@ fn it_fits_a_window_and_a_phone() {
 fn the_handle_plays_seeks_and_steers() {
     let Some(tools) = tools() else { return };
     let folder = folder("browser-handle");
-    prepare(&folder);
+    let prepared = prepare_hall(&folder);
     let script = "
         const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
         const until = async (what) => { for (let i = 0; i < 200 && !what(); i++) await sleep(50); return what(); };
@@ -237,9 +231,7 @@ fn the_handle_plays_seeks_and_steers() {
         .map(|backend| {
             json!({
                 "name": backend, "width": 320, "height": 180, "script": script,
-                "query": format!(
-                    "?scene=data/scene.glb&stream=data/stream.dapple&backend={backend}&shadowResolution=256&samples=1"
-                ),
+                "query": format!("{}&backend={backend}&shadowResolution=256&samples=1", prepared.query()),
             })
         })
         .collect();
@@ -272,21 +264,21 @@ fn the_handle_plays_seeks_and_steers() {
 fn what_cannot_be_shown_is_said_in_the_page() {
     let Some(tools) = tools() else { return };
     let folder = folder("browser-messages");
-    prepare(&folder);
+    prepare_hall(&folder);
     std::fs::write(folder.join("broken.glb"), b"glTF nothing of the kind").expect("a file is written");
     let glb = dapple_scene::builtin::glb("atrium", 0.02).expect("a scene");
     std::fs::write(folder.join("other.glb"), glb).expect("a file is written");
-    let stream = std::fs::read(folder.join("stream.dapple")).expect("the stream");
+    let stream = std::fs::read(folder.join("hall.dapple")).expect("the stream");
     std::fs::write(folder.join("cut.dapple"), &stream[..stream.len() / 2]).expect("a file is written");
     let cases = [
         ("nothing", "", "Nothing to show was named"),
         ("missing", "?scene=data/missing.glb", "the server says 404"),
         ("broken", "?scene=data/broken.glb", "broken.glb cannot be shown"),
-        ("stream", "?scene=data/scene.glb&stream=data/missing.dapple", "the server says 404"),
-        ("cut", "?scene=data/scene.glb&stream=data/cut.dapple", "it was cut"),
-        ("no-stream", "?scene=data/scene.glb&stream=data/scene.glb", "this is no .dapple file"),
-        ("wrong", "?scene=data/other.glb&stream=data/stream.dapple", "load the same scene on both ends"),
-        ("backend", "?scene=data/scene.glb&backend=vulkan", "there is no backend"),
+        ("stream", "?scene=data/hall.glb&stream=data/missing.dapple", "the server says 404"),
+        ("cut", "?scene=data/hall.glb&stream=data/cut.dapple", "it was cut"),
+        ("no-stream", "?scene=data/hall.glb&stream=data/hall.glb", "this is no .dapple file"),
+        ("wrong", "?scene=data/other.glb&stream=data/hall.dapple", "load the same scene on both ends"),
+        ("backend", "?scene=data/hall.glb&backend=vulkan", "there is no backend"),
     ];
     let pages: Vec<Value> = cases
         .iter()
@@ -310,9 +302,9 @@ fn what_cannot_be_shown_is_said_in_the_page() {
 fn a_browser_without_3d_graphics_says_so() {
     let Some(tools) = tools() else { return };
     let folder = folder("browser-bare");
-    prepare(&folder);
+    prepare_hall(&folder);
     let page = json!({
-        "name": "bare", "query": "?scene=data/scene.glb", "width": 640, "height": 360, "expectMessage": true, "shot": true,
+        "name": "bare", "query": "?scene=data/hall.glb", "width": 640, "height": 360, "expectMessage": true, "shot": true,
     });
     let flags = ["--no-sandbox", "--disable-gpu", "--disable-3d-apis"];
     let reports = drive(&tools, &folder, &[page], Some(&flags));

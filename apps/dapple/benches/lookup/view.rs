@@ -67,13 +67,20 @@ impl View {
             let open = [0.0, 0.0, -1.0, 1.0];
             let Some(fragment) = self.fragments[i].filter(|_| sample.is_covered()) else { return open };
             let Some(charts) = atlas.charts(fragment.instance) else { return open };
+            let back = sample.is_back_face();
             if charts.is_per_vertex() {
-                let value = atlas.visibility(fragment.instance, sample.triangle, sample.barycentrics, 1.0);
+                let value =
+                    atlas.visibility(fragment.instance, sample.triangle, sample.barycentrics, back, 1.0);
                 return [value, value, -2.0, 1.0];
             }
             let (page, x, y) = charts.texel_at(sample.triangle as usize, sample.barycentrics);
-            match atlas.placements(fragment.instance).get(usize::from(page)) {
-                Some(at) => [at.x as f32 + x, at.y as f32 + y, at.layer as f32, 1.0],
+            let placements = if back {
+                atlas.back_placements(fragment.instance)
+            } else {
+                atlas.placements(fragment.instance)
+            };
+            match placements.get(usize::from(page)) {
+                Some(at) => [f32::from(at.x) + x, f32::from(at.y) + y, f32::from(at.layer), 1.0],
                 None => open,
             }
         };

@@ -244,7 +244,7 @@ fn find(scene: &Scene, store: &PointStore, cuts: &Cuts, samples: &Samples) -> Re
     let by_atlas = |cuts: Option<&Cuts>| {
         let mut atlas = VisibilityAtlas::new(store.layout().clone(), scene, cuts, AtlasParams::default());
         while !atlas.work(scene, store.visibility(), usize::MAX).is_complete() {}
-        let look_up = |p: &Place| atlas.visibility(p.rest.instance, p.triangle, p.barycentrics, 1.0);
+        let look_up = |p: &Place| atlas.visibility(p.rest.instance, p.triangle, p.barycentrics, p.back, 1.0);
         samples.places.par_iter().map(look_up).collect::<Vec<f32>>()
     };
     let paper = PointHash::new(store.layout(), store.visibility(), Hat::default())?;

@@ -118,6 +118,7 @@ pub(super) const INSTANCE_STORED_TANGENTS: u32 = 1;
 pub(super) const INSTANCE_MIRRORED: u32 = 2;
 pub(super) const INSTANCE_REST_MIRRORED: u32 = 4;
 pub(super) const INSTANCE_PER_VERTEX: u32 = 8;
+pub(super) const INSTANCE_BACK_PAGES_SHIFT: u32 = 16;
 
 /// `RIGID` in `deform.wgsl`.
 pub(super) const RIGID: u32 = u32::MAX;

@@ -18,7 +18,7 @@ use super::ForwardError;
 use super::atlas::{AtlasBand, AtlasTexture};
 use super::layouts::{self, Growing};
 use super::uniforms::{
-    INSTANCE_MIRRORED, INSTANCE_PER_VERTEX, INSTANCE_REST_MIRRORED, INSTANCE_STORED_TANGENTS, InstanceRaw,
+    INSTANCE_BACK_PAGES_SHIFT, INSTANCE_MIRRORED, INSTANCE_PER_VERTEX, INSTANCE_REST_MIRRORED, INSTANCE_STORED_TANGENTS, InstanceRaw,
     RIGID, rows,
 };
 use crate::gbuffer::check_scene;
@@ -199,13 +199,22 @@ impl GpuScene {
     }
 
     /// Places the pages of an instance in the atlas, in the order of [`ChartSet::pages`]. Pages without a place are open, as
-    /// all of them are before this is called.
+    /// all of them are before this is called. Twice as many places as the instance's charts have pages are those of the
+    /// front, then those of the back; otherwise the back shows what the front does.
     ///
     /// # Errors
     /// An instance that is not there.
     pub fn set_pages(&mut self, gpu: &Gpu, instance: u32, places: &[Placement]) -> Result<(), ForwardError> {
         if instance as usize >= self.instances.len() {
             return Err(ForwardError::Charts { instance, reason: "the scene has no such instance" });
+        }
+        let first_slot = self.scene.meshes.len();
+        let (slot, bits) = &mut self.instances[instance as usize];
+        let charted = slot.checked_sub(first_slot).and_then(|index| self.charted.get(index));
+        let pages = charted.map_or(0, |charted| charted.charts.pages().len());
+        *bits &= (1 << INSTANCE_BACK_PAGES_SHIFT) - 1;
+        if pages > 0 && places.len() == 2 * pages && pages <= usize::from(u16::MAX) {
+            *bits |= (pages as u32) << INSTANCE_BACK_PAGES_SHIFT;
         }
         if self.pages.set(gpu, instance as usize, places) {
             self.regroup(gpu);

@@ -92,6 +92,7 @@ fn constants_are_the_same_on_both_sides() {
     says(vertex, format!("const INSTANCE_MIRRORED: u32 = {INSTANCE_MIRRORED}u;"));
     says(vertex, format!("const INSTANCE_REST_MIRRORED: u32 = {INSTANCE_REST_MIRRORED}u;"));
     says(vertex, format!("const INSTANCE_PER_VERTEX: u32 = {INSTANCE_PER_VERTEX}u;"));
+    says(vertex, format!("const INSTANCE_BACK_PAGES_SHIFT: u32 = {INSTANCE_BACK_PAGES_SHIFT}u;"));
     says(MATERIAL_WGSL, format!("const MATERIAL_UNLIT: u32 = {MATERIAL_UNLIT}u;"));
     says(MATERIAL_WGSL, format!("const MATERIAL_NORMAL_MAP: u32 = {MATERIAL_NORMAL_MAP}u;"));
     says(FRAME_WGSL, format!("array<Light, {MAX_LIGHTS}>"));

@@ -11,7 +11,9 @@ override INSPECTS: bool = false;
 const SMALLEST_COSINE: f32 = 1e-3;
 
 @fragment
-fn fragment(v: Varyings, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
+fn fragment(varyings: Varyings, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
+    var v = varyings;
+    v.atlas = select(varyings.atlas_back, varyings.atlas, is_front);
     // Derivatives and mip levels need all four pixels of a quad: before anything branches.
     let dx = dpdx(v.relative);
     let dy = dpdy(v.relative);

@@ -17,6 +17,8 @@ const INSTANCE_STORED_TANGENTS: u32 = 1u;
 const INSTANCE_MIRRORED: u32 = 2u;
 const INSTANCE_REST_MIRRORED: u32 = 4u;
 const INSTANCE_PER_VERTEX: u32 = 8u;
+// From this bit on: number of pages of one side, if the back has pages of its own after the front's, or 0.
+const INSTANCE_BACK_PAGES_SHIFT: u32 = 16u;
 
 struct PlainVertex {
     @location(0) position: vec3<f32>,
@@ -58,6 +60,8 @@ struct Varyings {
     @location(6) position_rest: vec3<f32>,
     // Index of the instance, its bits, number of the chart.
     @location(7) @interpolate(flat, either) ids: vec3<u32>,
+    // Of the back, where it has texels of its own.
+    @location(8) @interpolate(perspective, centroid) atlas_back: vec3<f32>,
 }
 
 @vertex
@@ -83,6 +87,11 @@ fn place(v: PlainVertex, detail: DetailedVertex) -> Varyings {
     out.uv = detail.uv;
     out.color = detail.color;
     out.atlas = atlas_place(v.chart, v.instance.y, v.instance.w);
+    out.atlas_back = out.atlas;
+    let back_pages = v.instance.w >> INSTANCE_BACK_PAGES_SHIFT;
+    if back_pages > 0u {
+        out.atlas_back = atlas_place(v.chart, v.instance.y + back_pages, v.instance.w);
+    }
     out.position_rest = vec3(0.0);
     if NEEDS_REST {
         out.position_rest = vec3(dot(v.rest_x.xyz, v.position), dot(v.rest_y.xyz, v.position), dot(v.rest_z.xyz, v.position));
