@@ -65,9 +65,13 @@ impl Overlay {
         if !self.hidden {
             time_bar(ui, show);
             let figures = show.figures(now_s);
-            egui::Window::new("dapple").anchor(Align2::LEFT_TOP, vec2(8.0, 8.0)).resizable(false).show(
-                &ctx,
-                |ui| {
+            let room = (ctx.content_rect().height() - 60.0).max(60.0);
+            egui::Window::new("dapple")
+                .anchor(Align2::LEFT_TOP, vec2(8.0, 8.0))
+                .resizable(false)
+                .vscroll(true)
+                .max_height(room)
+                .show(&ctx, |ui| {
                     figures_grid(ui, show, &figures);
                     ui.separator();
                     wish = choices(ui, show);
@@ -79,8 +83,7 @@ impl Overlay {
                             self.help = !self.help;
                         }
                     });
-                },
-            );
+                });
         }
         divider(&ctx, show);
         self.messages(&ctx, show, now_s);
@@ -98,7 +101,7 @@ impl Overlay {
         if self.notice.is_none() && preparing.is_none() && self.failure.is_none() {
             return;
         }
-        egui::Area::new(egui::Id::new("messages"))
+        egui::Area::new(egui::Id::unique("messages"))
             .anchor(Align2::CENTER_TOP, vec2(0.0, 8.0))
             .interactable(false)
             .show(ctx, |ui| {
@@ -129,7 +132,7 @@ fn figures_grid(ui: &mut Ui, show: &Show, figures: &Figures) {
     };
     let (heap, card) = viewer.memory_bytes;
     let rows = [
-        ("pictures", format!("{:.0} /s", figures.fps)),
+        ("pictures", format!("{:.1} /s", figures.fps)),
         ("stream", format!("{:.2} Mbit/s", figures.megabits_per_second)),
         ("received", size(viewer.bytes_received)),
         ("points", viewer.points.to_string()),
@@ -226,7 +229,7 @@ fn divider(ctx: &Context, show: &mut Show) {
     let mut screen = ctx.content_rect();
     screen.max.y = (screen.max.y - BELOW).max(screen.min.y);
     let x = screen.left() + *part * screen.width();
-    let area = egui::Area::new(egui::Id::new("divider"))
+    let area = egui::Area::new(egui::Id::unique("divider"))
         .fixed_pos(egui::pos2(x - 0.5 * HANDLE, screen.top()))
         .constrain(false);
     area.show(ctx, |ui| {
