@@ -53,7 +53,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Eval(args) => args.threads,
         Command::Render(args) => args.threads,
         Command::Record(args) => args.threads,
-Command::Quality(args) => args.threads,
+        Command::Quality(args) => args.threads,
         Command::Scene(_) | Command::Inspect(_) | Command::Demo(_) | Command::View(_) => 0,
     };
     if threads > 1024 {

@@ -65,9 +65,13 @@ impl Overlay {
         if !self.hidden {
             time_bar(ui, show);
             let figures = show.figures(now_s);
-            egui::Window::new("dapple").anchor(Align2::LEFT_TOP, vec2(8.0, 8.0)).resizable(false).show(
-                &ctx,
-                |ui| {
+            let room = (ctx.content_rect().height() - 60.0).max(60.0);
+            egui::Window::new("dapple")
+                .anchor(Align2::LEFT_TOP, vec2(8.0, 8.0))
+                .resizable(false)
+                .vscroll(true)
+                .max_height(room)
+                .show(&ctx, |ui| {
                     figures_grid(ui, show, &figures);
                     ui.separator();
                     wish = choices(ui, show);
@@ -79,8 +83,7 @@ impl Overlay {
                             self.help = !self.help;
                         }
                     });
-                },
-            );
+                });
         }
         divider(&ctx, show);
         self.messages(&ctx, show, now_s);
@@ -129,7 +132,7 @@ fn figures_grid(ui: &mut Ui, show: &Show, figures: &Figures) {
     };
     let (heap, card) = viewer.memory_bytes;
     let rows = [
-        ("pictures", format!("{:.0} /s", figures.fps)),
+        ("pictures", format!("{:.1} /s", figures.fps)),
         ("stream", format!("{:.2} Mbit/s", figures.megabits_per_second)),
         ("received", size(viewer.bytes_received)),
         ("points", viewer.points.to_string()),

@@ -22,8 +22,9 @@ use crate::light::{scene_seconds, server_config};
 /// Texels that are worked on at a time: some milliseconds.
 const WORK_TEXELS: usize = 512;
 
-/// Seconds of a frame that may go into work after a snapshot.
-const WORK_S: f64 = 0.008;
+/// Part of the time between two pictures that may go into work after a snapshot, and its bounds in seconds.
+const WORK_PART: f64 = 0.25;
+const WORK_S: (f64, f64) = (0.008, 0.25);
 
 /// A scene and everything that goes on with it.
 pub(super) struct Show {
@@ -138,7 +139,8 @@ impl Show {
             self.receive(&frame, now_s)?;
         }
         changed |= self.steering.advance(&self.scene, self.clock.time_s(), elapsed_s);
-        while elapsed() < WORK_S {
+        let work_s = (WORK_PART * elapsed_s).clamp(WORK_S.0, WORK_S.1);
+        while elapsed() < work_s {
             let progress = self.viewer.work(WORK_TEXELS);
             changed |= progress != self.progress;
             self.progress = progress;

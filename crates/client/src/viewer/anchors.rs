@@ -22,7 +22,11 @@ impl Anchors {
     pub(super) fn new(layout: &PointLayout, scene: &Scene) -> Anchors {
         let sets = layout.sets().iter().map(|set| {
             let mesh = scene.instances.get(set.instance as usize).map(|i| &scene.meshes[i.mesh as usize]);
-            if mesh.is_some_and(|mesh| mesh.is_deformable()) { anchor(layout, set, scene) } else { Vec::new() }
+            if mesh.is_some_and(|mesh| mesh.is_deformable()) {
+                anchor(layout, set, scene)
+            } else {
+                Vec::new()
+            }
         });
         Anchors { sets: sets.collect() }
     }
@@ -32,19 +36,22 @@ impl Anchors {
         let mut positions = Vec::with_capacity(layout.len());
         for (set, anchors) in layout.sets().iter().zip(&self.sets) {
             let index = set.instance as usize;
-            let (Some(instance), Some(posed)) = (scene.instances.get(index), pose.instances.get(index)) else {
+            let (Some(instance), Some(posed)) = (scene.instances.get(index), pose.instances.get(index))
+            else {
                 positions.extend((0..set.len()).map(|_| Vec3::NAN));
                 continue;
             };
             let mesh = &scene.meshes[instance.mesh as usize];
             match &posed.deformed {
                 Some(deformed) if !anchors.is_empty() => positions.extend(anchors.iter().map(|anchor| {
-                    let [a, b, c] = mesh.triangles[anchor.triangle as usize].map(|v| deformed.positions[v as usize]);
+                    let [a, b, c] =
+                        mesh.triangles[anchor.triangle as usize].map(|v| deformed.positions[v as usize]);
                     let [u, v] = anchor.barycentrics;
                     posed.world_from_mesh.transform_point3(a + (b - a) * u + (c - a) * v)
                 })),
                 _ => {
-                    let world_from_rest = posed.world_from_mesh * Affine3A::from_mat3(instance.rest_from_mesh.inverse());
+                    let world_from_rest =
+                        posed.world_from_mesh * Affine3A::from_mat3(instance.rest_from_mesh.inverse());
                     let rest = (0..set.len()).map(|i| set.position_rest(i, layout.quantum_m()));
                     positions.extend(rest.map(|p| world_from_rest.transform_point3(p)));
                 }

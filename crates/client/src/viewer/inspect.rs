@@ -67,7 +67,9 @@ impl Inspection {
         let mut texels = Vec::with_capacity(atlas.all_texels().len());
         for layer in 0..atlas.layers() {
             let infos = atlas.texel_infos(layer);
-            texels.extend(infos.iter().map(|info| [info.weights, info.heaviest.saturating_sub(1).min(255) as u8]));
+            texels.extend(
+                infos.iter().map(|info| [info.weights, info.heaviest.saturating_sub(1).min(255) as u8]),
+            );
         }
         upload(gpu, gpu_scene, atlas, &texels)?;
         self.shown = now;

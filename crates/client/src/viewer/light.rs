@@ -74,11 +74,20 @@ impl Light {
 
     /// How far the fade is at `now_s`, 0 … 1.
     pub(super) fn fade(&self, now_s: f64, fade_s: f32) -> f32 {
-        if fade_s > 0.0 { ((now_s - self.fade_start_s) / f64::from(fade_s)).clamp(0.0, 1.0) as f32 } else { 1.0 }
+        if fade_s > 0.0 {
+            ((now_s - self.fade_start_s) / f64::from(fade_s)).clamp(0.0, 1.0) as f32
+        } else {
+            1.0
+        }
     }
 
     /// Brings onto the card what changed since the last call.
-    pub(super) fn upload(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene, now_s: f64) -> Result<(), ForwardError> {
+    pub(super) fn upload(
+        &mut self,
+        gpu: &Gpu,
+        gpu_scene: &mut GpuScene,
+        now_s: f64,
+    ) -> Result<(), ForwardError> {
         let Some(atlas) = &mut self.atlas else { return Ok(()) };
         if std::mem::take(&mut self.is_new) {
             for instance in 0..self.scene.instances.len() as u32 {

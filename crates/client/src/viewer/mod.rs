@@ -26,8 +26,8 @@ use dapple_stream::{Applied, ReceiveError, Subscriber};
 
 use anchors::Anchors;
 use light::Light;
-use paper::PaperLookup;
 pub use options::{DebugView, DrawOptions, LoadProgress, Method, ViewerConfig, ViewerError, ViewerStats};
+use paper::PaperLookup;
 
 /// One viewer's copy of the light on a graphics card, and the passes that draw with it.
 pub struct Viewer {
@@ -63,7 +63,12 @@ impl Viewer {
         limits.max_sets = limits.max_sets.max(u32::try_from(scene.instances.len()).unwrap_or(u32::MAX));
         let subscriber = Subscriber::new(Some(scene.hash().0), limits);
         let gpu_scene = GpuScene::new(gpu, scene.clone(), &GpuSceneOptions { mips: config.mips })?;
-        let forward = Forward::new(gpu, config.format.remove_srgb_suffix(), config.samples, &[PaperLookup::lookup(gpu)])?;
+        let forward = Forward::new(
+            gpu,
+            config.format.remove_srgb_suffix(),
+            config.samples,
+            &[PaperLookup::lookup(gpu)],
+        )?;
         Ok(Viewer {
             light: Light::new(scene.clone(), subscriber),
             scene,
@@ -139,7 +144,11 @@ impl Viewer {
         }
         let wants_points = options.view == DebugView::Points;
         // Only where points are shown must the processor know where deforming meshes are.
-        let pose = if wants_points { self.scene.pose(scene_time_s) } else { self.scene.pose_undeformed(scene_time_s) };
+        let pose = if wants_points {
+            self.scene.pose(scene_time_s)
+        } else {
+            self.scene.pose_undeformed(scene_time_s)
+        };
         if wants_points {
             self.place_points(gpu, &pose);
         }
@@ -188,7 +197,11 @@ impl Viewer {
         let store_bytes = self.stats.points as u64 * BYTES_A_STORED_POINT;
         let (atlas_bytes, texels) =
             self.light.atlas.as_ref().map_or((0, 0), |a| (a.memory_bytes(), a.texel_count() as u32));
-        ViewerStats { texels, memory_bytes: (store_bytes + atlas_bytes, self.gpu_scene.bytes()), ..self.stats }
+        ViewerStats {
+            texels,
+            memory_bytes: (store_bytes + atlas_bytes, self.gpu_scene.bytes()),
+            ..self.stats
+        }
     }
 
     /// What this viewer holds; nothing before the first snapshot.
@@ -236,7 +249,8 @@ fn views<'a>(
         DebugView::Age => ViewKind::Age,
         DebugView::Error => ViewKind::Error { other: lookup(other) },
     };
-    let view = |method, scissor| View { camera, viewport: None, scissor, kind, lookup: lookup(method), points };
+    let view =
+        |method, scissor| View { camera, viewport: None, scissor, kind, lookup: lookup(method), points };
     let rect = |x: u32, width: u32| Some(Rect { x, y: 0, width, height: size.1 });
     match options.split {
         Some((at, method)) if options.view != DebugView::Error => {

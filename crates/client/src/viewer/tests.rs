@@ -16,7 +16,9 @@ const SIZE: (u32, u32) = (160, 90);
 
 fn atrium() -> Arc<Scene> {
     let glb = builtin::glb("atrium", 0.05).expect("the name is known");
-    Arc::new(dapple_scene::load("atrium.glb", &glb, &NoFiles).expect("the loader reads what the builder writes"))
+    Arc::new(
+        dapple_scene::load("atrium.glb", &glb, &NoFiles).expect("the loader reads what the builder writes"),
+    )
 }
 
 fn server(scene: &Arc<Scene>, points_per_m2: f32) -> Server {
@@ -147,7 +149,13 @@ fn a_fade_goes_from_the_last_update_to_this_one() {
     assert!(!changed.is_empty(), "the update is seen");
     for i in changed {
         let half = (u16::from(start[i][0]) + u16::from(end[i][0])) / 2;
-        assert!(half.abs_diff(u16::from(middle[i][0])) <= 2, "pixel {i}: {:?} {:?} {:?}", start[i], middle[i], end[i]);
+        assert!(
+            half.abs_diff(u16::from(middle[i][0])) <= 2,
+            "pixel {i}: {:?} {:?} {:?}",
+            start[i],
+            middle[i],
+            end[i]
+        );
     }
 }
 
