@@ -9,7 +9,8 @@ use crate::corpus;
 use crate::input::fingerprint;
 
 /// Small, so that what a few bytes claim stays fast to make.
-const LIMITS: Limits = Limits { max_frame_bytes: 1 << 16, max_points: 1 << 16, max_sets: 256, max_cuts: 1 << 16 };
+const LIMITS: Limits =
+    Limits { max_frame_bytes: 1 << 16, max_points: 1 << 16, max_sets: 256, max_cuts: 1 << 16 };
 
 /// A subscriber that holds the sample store at group 0, epoch 0.
 static HOLDING: LazyLock<Subscriber> = LazyLock::new(|| {

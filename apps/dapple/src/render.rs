@@ -1,7 +1,7 @@
 //! `dapple render`: one picture.
 
 use anyhow::{Result, bail};
-use dapple_client::{Client, Drawn, PictureParams, draw, Reconstruction};
+use dapple_client::{Client, Drawn, PictureParams, Reconstruction, draw};
 use dapple_render::compose::{ErrorKind, NormalSpace, PointsView, draw_points, resolve_plane, view_error};
 use dapple_render::compose::{view_normals, view_visibility};
 use dapple_render::image::{Rgb8Image, ToneMap};

@@ -46,8 +46,11 @@ impl Case {
     }
 
     fn score(&self, visibility: impl Fn(&Drawn) -> Vec<f32>) -> f64 {
-        let errors: Vec<f64> =
-            self.views.iter().map(|(d, truth)| common::mean_squared_error(d, truth, &visibility(d))).collect();
+        let errors: Vec<f64> = self
+            .views
+            .iter()
+            .map(|(d, truth)| common::mean_squared_error(d, truth, &visibility(d)))
+            .collect();
         -10.0 * (errors.iter().sum::<f64>() / errors.len() as f64).log10()
     }
 

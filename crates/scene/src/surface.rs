@@ -39,6 +39,11 @@ impl Scene {
         sampler.sample(&self.images[sampler.image as usize], texture.image_from_uv.transform_point2(uv))
     }
 
+    /// Whether a part of a mesh is seen from both sides.
+    pub fn is_two_sided(&self, mesh: &Mesh) -> bool {
+        mesh.parts.iter().any(|part| self.materials[part.material as usize].double_sided)
+    }
+
     /// Whether a place on a mesh is cut out by its material's alpha: below the cutoff of a mask, or
     /// below 0.5 of a blended material. Such places neither block rays, nor are drawn, nor carry points.
     pub fn is_hole(&self, mesh: &Mesh, triangle: u32, barycentrics: [f32; 2]) -> bool {

@@ -199,7 +199,10 @@ fn rules_of_the_format_are_enforced() {
     assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 1, 2, 10, 2, 1, 2, 0])).contains("does not exist"));
     assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 1, 2, 9, 2, 0, 2, 0])).contains("cuts nothing"));
     assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 0, 0, 0, 0])).contains("a set has none"));
-    assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 1, 4, 9, 0, 2, 1, 2, 0])).contains("more than there are cuts"));
+    assert!(
+        reason(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 1, 4, 9, 0, 2, 1, 2, 0]))
+            .contains("more than there are cuts")
+    );
     assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9])).contains("ends early"));
     assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 1, 2, 9, 2, 1])).contains("ends early"));
     let over = [0x80, 0x80, 0x80, 0x80, 0x10];

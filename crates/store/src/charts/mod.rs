@@ -16,6 +16,7 @@ mod per_vertex;
 mod plan;
 mod raster;
 mod set;
+mod sides;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -28,6 +29,7 @@ pub use plan::{InstanceKey, SceneCharts};
 pub use set::{
     ChartError, ChartParams, ChartSet, ChartUv, ChartVertices, MOST_TEXELS, PageSize, Site, TEXEL_FRACTION,
 };
+pub use sides::add_back_sites;
 pub use weights::{
     Candidate, MAX_CANDIDATES, MAX_WEIGHTS, PointNeighbours, TexelWeights, WEIGHT_SUM, Weigher, WeightParams,
 };

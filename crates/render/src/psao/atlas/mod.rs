@@ -15,6 +15,7 @@ use std::sync::Arc;
 use dapple_scene::Scene;
 use dapple_store::charts::{
     AtlasError, ChartError, ChartParams, ChartSet, Cuts, InstanceKey, PointNeighbours, WeightParams,
+    add_back_sites,
 };
 use dapple_store::points::PointLayout;
 
@@ -111,6 +112,7 @@ struct ReadySet {
     charts_key: InstanceKey,
     table: PointTexels,
     sums: Sums,
+    /// Of the front's pages, then, if it is seen from both sides, of the back's.
     placements: Vec<Placement>,
     placed: PlacedPages,
 }
@@ -241,8 +243,11 @@ impl VisibilityAtlas {
         let charts = match same {
             Some(charts) => charts,
             None => {
-                match ChartSet::new(&key.positions_rest(&mesh.positions), &mesh.triangles, &key.params(&defaults))
-                {
+                match ChartSet::new(
+                    &key.positions_rest(&mesh.positions),
+                    &mesh.triangles,
+                    &key.params(&defaults),
+                ) {
                     Ok(charts) => Arc::new(charts),
                     Err(error) => {
                         self.failed.push((instance_index, error.into()));
@@ -264,12 +269,17 @@ impl VisibilityAtlas {
             Stage::Sites => {
                 let mesh = &scene.meshes[scene.instances[set.instance as usize].mesh as usize];
                 let positions_rest = job.charts_key.positions_rest(&mesh.positions);
-                let sites = job.charts.sites(&positions_rest, &mesh.triangles);
+                let mut sites = job.charts.sites(&positions_rest, &mesh.triangles);
+                let mut texels = job.charts.texel_count();
+                if scene.is_two_sided(mesh) {
+                    add_back_sites(&mut sites, texels);
+                    texels *= 2;
+                }
                 let neighbours = PointNeighbours::new(&layout, set, &self.params.weights);
                 cost = sites.len() / 4 + mesh.triangles.len() / 4;
                 let cuts = self.cuts.as_ref().and_then(|cuts| cuts.for_sites(set.instance, &sites));
                 let cuts = cuts.map_or(Vec::new(), |set| set.cuts.clone());
-                Stage::Weigh(Box::new(Builder::new(neighbours, set, sites, cuts, job.charts.texel_count())))
+                Stage::Weigh(Box::new(Builder::new(neighbours, set, sites, cuts, texels)))
             }
             Stage::Weigh(mut builder) => {
                 let before = builder.weighed();
@@ -318,18 +328,20 @@ impl VisibilityAtlas {
         table: PointTexels,
         sums: Sums,
     ) {
-        let placements = match self.pages.place(charts.pages()) {
+        // The back's texels follow the front's.
+        let sides = if sums.len() > charts.texel_count() as usize { 2 } else { 1 };
+        let placements = match self.pages.place(&charts.pages().repeat(sides)) {
             Ok(placements) => placements,
             Err(error) => {
                 self.failed.push((self.layout.sets()[set].instance, error.into()));
                 return;
             }
         };
-        for (page, (placement, size)) in placements.iter().zip(charts.pages()).enumerate() {
-            let first = charts.first_texel_of_page(page);
+        let placed = PlacedPages::new(&charts, &placements, self.pages.side());
+        for ((first, size), placement) in placed.firsts().zip(charts.pages().iter().cycle()).zip(&placements)
+        {
             self.pages.fill(*placement, *size, |i| [255, sums.value(first + i)]);
         }
-        let placed = PlacedPages::new(&charts, &placements, self.pages.side());
         let ready = ReadySet { charts, charts_key, table, sums, placements, placed };
         self.sets[set] = SetState::Ready(Box::new(ready));
         self.fresh.push(set);
@@ -341,7 +353,7 @@ impl VisibilityAtlas {
     pub fn begin_update(&mut self) {
         for set in std::mem::take(&mut self.fresh) {
             if let SetState::Ready(ready) = &self.sets[set] {
-                for (placement, size) in ready.placements.iter().zip(ready.charts.pages()) {
+                for (placement, size) in ready.placements.iter().zip(ready.charts.pages().iter().cycle()) {
                     self.pages.settle_page(*placement, *size);
                 }
             }

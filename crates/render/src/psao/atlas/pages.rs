@@ -92,7 +92,8 @@ impl Pages {
     pub(super) fn fill(&mut self, place: Placement, size: PageSize, value: impl Fn(u32) -> [u8; 2]) {
         let mut index = 0;
         for y in 0..u32::from(size.height) {
-            let start = self.address(u32::from(place.layer), u32::from(place.x), u32::from(place.y) + y) as usize;
+            let start =
+                self.address(u32::from(place.layer), u32::from(place.x), u32::from(place.y) + y) as usize;
             for texel in &mut self.texels[start..start + usize::from(size.width)] {
                 *texel = value(index);
                 index += 1;
@@ -104,7 +105,8 @@ impl Pages {
     /// Ends the fade of all texels of a page.
     pub(super) fn settle_page(&mut self, place: Placement, size: PageSize) {
         for y in 0..u32::from(size.height) {
-            let start = self.address(u32::from(place.layer), u32::from(place.x), u32::from(place.y) + y) as usize;
+            let start =
+                self.address(u32::from(place.layer), u32::from(place.x), u32::from(place.y) + y) as usize;
             for texel in &mut self.texels[start..start + usize::from(size.width)] {
                 texel[0] = texel[1];
             }
@@ -168,13 +170,24 @@ struct PlacedPage {
 }
 
 impl PlacedPages {
+    /// `placements` are those of the charts' pages, once for each side.
     pub(super) fn new(charts: &ChartSet, placements: &[Placement], side: u32) -> PlacedPages {
-        let place = |(page, (p, size)): (usize, (&Placement, &PageSize))| PlacedPage {
-            first_texel: charts.first_texel_of_page(page),
-            width: u32::from(size.width),
-            address: (u32::from(p.layer) * side + u32::from(p.y)) * side + u32::from(p.x),
+        let mut first_texel = 0;
+        let place = |(p, size): (&Placement, &PageSize)| {
+            let first = first_texel;
+            first_texel += size.area();
+            PlacedPage {
+                first_texel: first,
+                width: u32::from(size.width),
+                address: (u32::from(p.layer) * side + u32::from(p.y)) * side + u32::from(p.x),
+            }
         };
-        PlacedPages { pages: placements.iter().zip(charts.pages()).enumerate().map(place).collect(), side }
+        PlacedPages { pages: placements.iter().zip(charts.pages().iter().cycle()).map(place).collect(), side }
+    }
+
+    /// Number of the first texel of each page.
+    pub(super) fn firsts(&self) -> impl Iterator<Item = u32> {
+        self.pages.iter().map(|page| page.first_texel)
     }
 
     /// A walk over texels that mostly follow each other.

@@ -79,6 +79,10 @@ impl Sums {
         value_of(self.sums[texel as usize])
     }
 
+    pub(super) fn len(&self) -> usize {
+        self.sums.len()
+    }
+
     pub(super) fn bytes(&self) -> usize {
         self.sums.len() * size_of::<u16>()
     }

@@ -96,7 +96,7 @@ fn news(atlas: &VisibilityAtlas) -> Vec<u8> {
 fn middles(scene: &Scene, atlas: &VisibilityAtlas, instance: u32, fade: f32) -> Vec<f32> {
     let mesh = scene.instances[instance as usize].mesh as usize;
     let triangles = scene.meshes[mesh].triangles.len() as u32;
-    (0..triangles).map(|t| atlas.visibility(instance, t, [0.3, 0.3], fade)).collect()
+    (0..triangles).map(|t| atlas.visibility(instance, t, [0.3, 0.3], false, fade)).collect()
 }
 
 proptest! {
@@ -195,7 +195,7 @@ fn a_gradient_is_kept_on_a_plane() {
         if place.x.abs().max(place.z.abs()) > 0.85 {
             continue;
         }
-        let (found, truth) = (atlas.visibility(0, triangle, [u, v], 1.0), slope(place));
+        let (found, truth) = (atlas.visibility(0, triangle, [u, v], false, 1.0), slope(place));
         // Points and texels are rounded to 1/255, weights to 1/256.
         assert!((found - truth).abs() < 0.006, "{found} instead of {truth} at {place}");
     }
@@ -207,24 +207,27 @@ fn surfaces_are_open_until_they_are_ready_and_then_fade_in() {
     let layout = lay(&scene, 0.1);
     let values = vec![0; layout.len()];
     let mut atlas = VisibilityAtlas::new(layout.clone(), &scene, None, AtlasParams::default());
-    assert_eq!(atlas.visibility(0, 0, [0.3, 0.3], 1.0), 1.0);
+    assert_eq!(atlas.visibility(0, 0, [0.3, 0.3], false, 1.0), 1.0);
     assert!(atlas.charts(0).is_none() && atlas.placements(0).is_empty());
     // The ground has the most points.
     while atlas.take_ready().is_empty() {
-        assert_eq!(atlas.visibility(0, 0, [0.3, 0.3], 1.0), 1.0);
+        assert_eq!(atlas.visibility(0, 0, [0.3, 0.3], false, 1.0), 1.0);
         atlas.work(&scene, &values, 10);
     }
     assert!(atlas.charts(0).is_some());
-    assert_eq!([0.0, 0.5, 1.0].map(|fade| atlas.visibility(0, 0, [0.3, 0.3], fade)), [1.0, 0.5, 0.0]);
+    assert_eq!([0.0, 0.5, 1.0].map(|fade| atlas.visibility(0, 0, [0.3, 0.3], false, fade)), [1.0, 0.5, 0.0]);
     assert!(!atlas.take_dirty().is_empty());
     atlas.begin_update();
-    assert_eq!(atlas.visibility(0, 0, [0.3, 0.3], 0.0), 0.0);
+    assert_eq!(atlas.visibility(0, 0, [0.3, 0.3], false, 0.0), 0.0);
     assert!(!atlas.take_dirty().is_empty());
     while !atlas.work(&scene, &values, 10).is_complete() {}
     assert_eq!(atlas.take_ready().len(), 3);
     assert!(Arc::ptr_eq(atlas.charts(2).unwrap(), atlas.charts(3).unwrap()), "one mesh, one size");
     // What is not in the scene or has no points is open.
-    assert_eq!([atlas.visibility(9, 0, [0.3, 0.3], 1.0), atlas.visibility(0, 99, [0.3, 0.3], 1.0)], [1.0; 2]);
+    assert_eq!(
+        [atlas.visibility(9, 0, [0.3, 0.3], false, 1.0), atlas.visibility(0, 99, [0.3, 0.3], false, 1.0)],
+        [1.0; 2]
+    );
 }
 
 #[test]
@@ -233,7 +236,8 @@ fn an_update_fades_from_the_one_before() {
     let layout = lay(&scene, 0.1);
     let mut atlas = complete(&scene, &layout, &vec![200; layout.len()]);
     let all = |old, new| (0..layout.len() as u32).map(move |point| PointChange { point, old, new });
-    let shown = |atlas: &VisibilityAtlas, fade| (atlas.visibility(1, 3, [0.3, 0.3], fade) * 255.0).round();
+    let shown =
+        |atlas: &VisibilityAtlas, fade| (atlas.visibility(1, 3, [0.3, 0.3], false, fade) * 255.0).round();
     for (old, new) in [(200, 100), (100, 40)] {
         atlas.begin_update();
         atlas.take_dirty();
@@ -308,7 +312,7 @@ fn build_in_pieces(spacing: f32) -> (usize, u64) {
         atlas.texel_count(),
         bytes as f64 / layout.len() as f64
     );
-    assert_eq!(atlas.visibility(2, 1, [0.2, 0.5], 1.0), 128.0 / 255.0);
+    assert_eq!(atlas.visibility(2, 1, [0.2, 0.5], false, 1.0), 128.0 / 255.0);
     assert_eq!(atlas.take_ready().len(), 4);
     (pieces, bytes / layout.len() as u64)
 }
@@ -370,7 +374,7 @@ fn leak(cut: bool) -> f32 {
         let [a, b, c] = triangles[triangle].map(|v| positions[v as usize]);
         let place = a + (b - a) * u + (c - a) * v;
         if dark(place) && place.x < 0.2 {
-            error += atlas.visibility(0, triangle as u32, [u, v], 1.0) - 0.2;
+            error += atlas.visibility(0, triangle as u32, [u, v], false, 1.0) - 0.2;
             count += 1;
         }
     }

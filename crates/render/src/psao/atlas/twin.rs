@@ -3,23 +3,32 @@
 use dapple_store::charts::{ChartUv, TEXEL_FRACTION};
 use rayon::prelude::*;
 
-use super::{ReadySet, SetState, VisibilityAtlas};
+use super::{Placement, ReadySet, SetState, VisibilityAtlas};
 use crate::gbuffer::GBuffer;
 
 impl VisibilityAtlas {
     /// Visibility 0 … 1 at a place of a triangle; `barycentrics` are the weights of the second and third corner. `fade` is
-    /// how far the last update has been faded in, 0 … 1. Open where nothing is ready or there are no points.
-    pub fn visibility(&self, instance: u32, triangle: u32, barycentrics: [f32; 2], fade: f32) -> f32 {
+    /// how far the last update has been faded in, 0 … 1; `back` is whether the triangle is seen from its back. Open where
+    /// nothing is ready or there are no points.
+    pub fn visibility(
+        &self,
+        instance: u32,
+        triangle: u32,
+        barycentrics: [f32; 2],
+        back: bool,
+        fade: f32,
+    ) -> f32 {
         let Some(ready) = self.ready_set(instance) else { return 1.0 };
         let Some(&corners) = ready.charts.corners().get(triangle as usize) else { return 1.0 };
+        let placements = ready.placements_of(back);
         let value = if ready.charts.is_per_vertex() {
             let [b, c] = barycentrics;
-            let corner = |uv| self.corner_value(ready, uv, fade);
+            let corner = |uv| self.corner_value(placements, uv, fade);
             let [va, vb, vc] = corners.map(corner);
             va + b * (vb - va) + c * (vc - va)
         } else {
             let (page, x, y) = ready.charts.texel_at(triangle as usize, barycentrics);
-            let Some(place) = ready.placements.get(usize::from(page)) else { return 1.0 };
+            let Some(place) = placements.get(usize::from(page)) else { return 1.0 };
             self.bilinear(u32::from(place.layer), f32::from(place.x) + x, f32::from(place.y) + y, fade)
         };
         (value / 255.0).clamp(0.0, 1.0)
@@ -30,17 +39,22 @@ impl VisibilityAtlas {
         let samples = gbuffer.samples().par_iter().with_min_len(1024);
         samples
             .map(|s| match s.is_covered() {
-                true => self.visibility(s.instance, s.triangle, s.barycentrics, fade),
+                true => self.visibility(s.instance, s.triangle, s.barycentrics, s.is_back_face(), fade),
                 false => 1.0,
             })
             .collect()
     }
 
     /// The texel that a corner lies on.
-    fn corner_value(&self, ready: &ReadySet, uv: ChartUv, fade: f32) -> f32 {
-        let Some(place) = ready.placements.get(usize::from(uv.page)) else { return 255.0 };
+    fn corner_value(&self, placements: &[Placement], uv: ChartUv, fade: f32) -> f32 {
+        let Some(place) = placements.get(usize::from(uv.page)) else { return 255.0 };
         let texel = |at: u16| u32::from(at / TEXEL_FRACTION);
-        self.mix(u32::from(place.layer), u32::from(place.x) + texel(uv.x), u32::from(place.y) + texel(uv.y), fade)
+        self.mix(
+            u32::from(place.layer),
+            u32::from(place.x) + texel(uv.x),
+            u32::from(place.y) + texel(uv.y),
+            fade,
+        )
     }
 
     /// Four texels around a place, which is in texels with centres at halves.
@@ -73,6 +87,17 @@ impl VisibilityAtlas {
         match &self.sets[at] {
             SetState::Ready(ready) => Some(ready),
             SetState::Open => None,
+        }
+    }
+}
+
+impl ReadySet {
+    /// Placements of the pages of one side; the front's for the back of what is seen from one side only.
+    pub(super) fn placements_of(&self, back: bool) -> &[Placement] {
+        let pages = self.charts.pages().len();
+        match back && self.placements.len() > pages {
+            true => &self.placements[pages..],
+            false => &self.placements[..pages],
         }
     }
 }

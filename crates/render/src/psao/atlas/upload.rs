@@ -67,9 +67,14 @@ impl VisibilityAtlas {
         self.ready_set(instance).map(|ready| &ready.charts)
     }
 
-    /// Where each page of an instance's charts lies; empty if it is not ready.
+    /// Where each page of an instance's charts lies, for its front; empty if it is not ready.
     pub fn placements(&self, instance: u32) -> &[Placement] {
-        self.ready_set(instance).map_or(&[], |ready| &ready.placements)
+        self.ready_set(instance).map_or(&[], |ready| ready.placements_of(false))
+    }
+
+    /// Where each page lies for its back: places of its own where the mesh is seen from both sides, else those of the front.
+    pub fn back_placements(&self, instance: u32) -> &[Placement] {
+        self.ready_set(instance).map_or(&[], |ready| ready.placements_of(true))
     }
 
     /// Bytes on the heap: tables, sums, texels, charts, and what is being made; not the layout, which the store owns
@@ -98,14 +103,15 @@ impl VisibilityAtlas {
             let SetState::Ready(ready) = state else { continue };
             for chart in 0..ready.charts.chart_count() {
                 let (page, [x, y, width, height]) = ready.charts.chart_rectangle(chart);
-                let Some(place) = ready.placements.get(usize::from(page)).filter(|p| u32::from(p.layer) == layer) else {
-                    continue;
-                };
-                for row in 0..u32::from(height) {
-                    let (x, y) = (u32::from(place.x) + u32::from(x), u32::from(place.y) + u32::from(y) + row);
-                    let start = (y * self.side() + x) as usize;
-                    for info in &mut infos[start..start + usize::from(width)] {
-                        info.chart = chart + 1;
+                let places =
+                    ready.placements.iter().skip(usize::from(page)).step_by(ready.charts.pages().len());
+                for place in places.filter(|p| u32::from(p.layer) == layer) {
+                    let (x, y) = (u32::from(place.x) + u32::from(x), u32::from(place.y) + u32::from(y));
+                    for row in y..y + u32::from(height) {
+                        let start = (row * self.side() + x) as usize;
+                        for info in &mut infos[start..start + usize::from(width)] {
+                            info.chart = chart + 1;
+                        }
                     }
                 }
             }

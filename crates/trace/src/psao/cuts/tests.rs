@@ -75,8 +75,7 @@ fn a_wall_cuts_exactly_what_lies_beyond_it() {
     let (layout, cuts) = cuts(&scene);
     let set = &layout.sets()[0];
     let placed = &scene.instances[0];
-    let positions: Vec<Vec3> =
-        scene.meshes[0].positions.iter().map(|&p| placed.rest_from_mesh * p).collect();
+    let positions: Vec<Vec3> = scene.meshes[0].positions.iter().map(|&p| placed.rest_from_mesh * p).collect();
     let params = ChartParams::for_spacing(layout.spacing_m(), false);
     let charts = ChartSet::new(&positions, &scene.meshes[0].triangles, &params).unwrap();
     let sites = charts.sites(&positions, &scene.meshes[0].triangles);
@@ -95,7 +94,8 @@ fn a_wall_cuts_exactly_what_lies_beyond_it() {
             let of = candidates.iter().filter(|c| (c.position_rest.dot(across) * side < 0.0) == beyond);
             of.map(|c| c.weight()).sum::<f32>()
         };
-        let spared = weight(false) < LEAST_LEFT * (weight(true) + weight(false));
+        let part_left = weight(false) / (weight(true) + weight(false));
+        let spared = !(LEAST_LEFT..=MOST_LEFT).contains(&part_left);
         for (bit, candidate) in candidates.iter().enumerate() {
             let beyond = candidate.position_rest.dot(across) * side < 0.0 && !spared;
             // The wall is as thin as a plane: a site on it is on either side.
