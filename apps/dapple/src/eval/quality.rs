@@ -24,6 +24,9 @@ use crate::picture::write_file;
 use crate::progress::Bar;
 use crate::source;
 
+/// Takes what was found at one density: points a m², the store, the samples, and a list a method.
+type Take<'a> = &'a mut dyn FnMut(f32, &PointStore, &Samples, Vec<Found>);
+
 /// Everything one run found.
 #[derive(Debug, Serialize)]
 struct Report {
@@ -194,7 +197,7 @@ impl Run<'_> {
         radius_m: f32,
         factor: f32,
         time_s: f64,
-        take: &mut dyn FnMut(f32, &PointStore, &Samples, Vec<Found>),
+        take: Take<'_>,
     ) -> Result<()> {
         let visibility = &self.args.visibility;
         let rest_pose = scene.pose(0.0);

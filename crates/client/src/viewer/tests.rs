@@ -163,7 +163,7 @@ fn a_fade_goes_from_the_last_update_to_this_one() {
 fn every_view_and_method_draws_and_a_split_shows_both() {
     let Some(gpu) = gpu_for_tests() else { return };
     let scene = atrium();
-    let server = server(&scene, 32.0);
+    let mut server = server(&scene, 32.0);
     let mut viewer = viewer(&gpu, &scene);
     let snapshot = server.join().expect("it can be encoded").expect("there is one");
     viewer.receive(&snapshot.bytes, 0.0).expect("it is sound");

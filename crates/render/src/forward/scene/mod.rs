@@ -18,8 +18,8 @@ use super::ForwardError;
 use super::atlas::{AtlasBand, AtlasTexture};
 use super::layouts::{self, Growing};
 use super::uniforms::{
-    INSTANCE_BACK_PAGES_SHIFT, INSTANCE_MIRRORED, INSTANCE_PER_VERTEX, INSTANCE_REST_MIRRORED, INSTANCE_STORED_TANGENTS, InstanceRaw,
-    RIGID, rows,
+    INSTANCE_BACK_PAGES_SHIFT, INSTANCE_MIRRORED, INSTANCE_PER_VERTEX, INSTANCE_REST_MIRRORED,
+    INSTANCE_STORED_TANGENTS, InstanceRaw, RIGID, rows,
 };
 use crate::gbuffer::check_scene;
 pub(super) use bounds::{CasterBounds, is_outside};

@@ -133,8 +133,10 @@ impl PointHash {
     /// How the forward pass looks up in these tables. Its group 3 binds the views of [`super::TableTextures`] as 0, 1, 2.
     pub fn lookup(device: &dapple_gpu::wgpu::Device) -> crate::forward::Lookup {
         let entries = super::TableTextures::layout_entries(0);
-        let descriptor =
-            dapple_gpu::wgpu::BindGroupLayoutDescriptor { label: Some("the paper's look-up"), entries: &entries };
+        let descriptor = dapple_gpu::wgpu::BindGroupLayoutDescriptor {
+            label: Some("the paper's look-up"),
+            entries: &entries,
+        };
         crate::forward::Lookup {
             label: "the paper's look-up",
             wgsl: vec![WGSL, include_str!("lookup.wgsl")],
