@@ -54,7 +54,7 @@ pub(crate) struct ViewArgs {
     #[arg(long, value_enum, default_value = "none")]
     pub(crate) other: ViewMethod,
     /// Seconds that an update fades in over; 0 for none [default: 1/15; 0 with --headless].
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) fade: Option<f32>,
     /// A camera of the scene by name, or one given as eye=X,Y,Z,target=X,Y,Z,fov=DEGREES (vertical)
     /// [default: the scene's first camera path].
