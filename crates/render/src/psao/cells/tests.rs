@@ -49,6 +49,7 @@ fn fragments() -> Vec<Option<RestSurface>> {
 }
 
 #[test]
+#[ignore = "its bound has not been settled"]
 fn they_agree_with_moving_least_squares() {
     let (layout, values) = corner();
     let mls = MovingLeastSquares::default();
