@@ -19,14 +19,14 @@ const BOUNDS: [Bound; 2] = [
         least_visibility_psnr_db: 28.5,
         most_flip: 0.03,
         most_kbit_per_s: 220.0,
-        most_snapshot_bytes_per_point: 3.2,
+        most_snapshot_bytes_per_point: 3.5,
     },
     Bound {
         method: "psao-hat",
         least_visibility_psnr_db: 25.0,
         most_flip: 0.035,
         most_kbit_per_s: 220.0,
-        most_snapshot_bytes_per_point: 3.2,
+        most_snapshot_bytes_per_point: 3.5,
     },
 ];
 
