@@ -5,19 +5,30 @@ export PATH := $(PATH):$(HOME)/.cargo/bin
 
 REPORT := $(CURDIR)/out/demo
 
-.PHONY: demo test check fmt
+.PHONY: demo web test bench check fmt
 
-# The whole loop on the built-in scene, and a report of it.
+# The whole loop on the built-in scene and a report of it; then the page, served on this machine (not with CI set).
 demo:
 	@bash scripts/setup.sh
 	cargo run --release --package dapple -- eval --out out/demo
 	@echo
 	@echo "The report: file://$(REPORT)/report.html"
+	@if [ -z "$$CI" ]; then cargo xtask wasm && cargo run --release --package dapple -- demo; fi
+
+# The page, into target/web, for any static server.
+web:
+	@bash scripts/setup.sh web
+	cargo xtask wasm
 
 # All checks and tests; what CI runs.
 test:
 	@bash scripts/setup.sh test
 	cargo xtask ci
+
+# What looking visibility up costs on this machine's adapter: target/bench.json.
+bench:
+	@bash scripts/setup.sh
+	cargo bench --package dapple --bench lookup
 
 check:
 	cargo xtask check

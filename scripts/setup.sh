@@ -2,7 +2,10 @@
 # Installs what a build needs and this machine lacks, where apt-get and the rights to use it are at hand.
 #
 # scripts/setup.sh          for `make demo`: make, a C and C++ compiler (FLIP and zstd come as source) and Rust
-# scripts/setup.sh test     for `make test`: the same, and git, rustfmt and clippy
+# scripts/setup.sh web      for `make web`: the same, and Rust's compiler for browsers
+# scripts/setup.sh test     for `make test`: all that, git, rustfmt and clippy; and what draws without a graphics card
+#                           (Mesa's Vulkan driver) and shows pages (Chromium, Node.js, npm), whose tests are skipped
+#                           where they cannot be had
 #
 # Rust comes from the system's rustup package where there is one; otherwise the message says how to get it.
 set -euo pipefail
@@ -19,21 +22,46 @@ if [ "${1:-}" = test ]; then has git || missing+=(git); fi
 # Only rustup's installer needs it.
 if ! has cargo; then has curl || missing+=(curl ca-certificates); fi
 
+as_root=()
+may_install=false
+if has apt-get; then
+    if [ "$(id -u)" -eq 0 ]; then
+        may_install=true
+    elif has sudo && sudo -n true 2>/dev/null; then
+        as_root=(sudo -n)
+        may_install=true
+    fi
+fi
+
+updated=false
+install() {
+    echo "setup: installing $*"
+    if [ $updated = false ]; then
+        "${as_root[@]}" apt-get update -qq </dev/null || return
+        updated=true
+    fi
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" </dev/null
+}
+
 if [ ${#missing[@]} -gt 0 ]; then
     has apt-get || stop "missing: ${missing[*]} (Debian's names), and there is no apt-get here." \
         "Install a C and a C++ compiler, git and curl by your system's means, then run this again."
-    if [ "$(id -u)" -eq 0 ]; then
-        as_root=()
-    elif has sudo && sudo -n true 2>/dev/null; then
-        as_root=(sudo -n)
-    else
-        stop "missing: ${missing[*]}, and there are no rights to install them. Run:" \
-            "    sudo apt-get install ${missing[*]}"
+    $may_install || stop "missing: ${missing[*]}, and there are no rights to install them. Run:" \
+        "    sudo apt-get install ${missing[*]}"
+    install "${missing[@]}"
+fi
+
+# Tests say what they skip where these are missing.
+if [ "${1:-}" = test ] && $may_install; then
+    optional=()
+    has chromium || has chromium-browser || has google-chrome || optional+=(chromium)
+    has node || optional+=(nodejs)
+    has npm || optional+=(npm)
+    compgen -G '/usr/share/vulkan/icd.d/lvp_icd*.json' >/dev/null || optional+=(mesa-vulkan-drivers)
+    compgen -G '/usr/lib/*/libvulkan.so.1' >/dev/null || optional+=(libvulkan1)
+    if [ ${#optional[@]} -gt 0 ]; then
+        install "${optional[@]}" || echo "setup: ${optional[*]} could not be installed: tests that need them are skipped" >&2
     fi
-    echo "setup: installing ${missing[*]}"
-    "${as_root[@]}" apt-get update -qq </dev/null
-    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
-        "${missing[@]}" </dev/null
 fi
 
 # --- Rust -------------------------------------------------------------------------------------------------------
@@ -66,4 +94,18 @@ if [ "${1:-}" = test ]; then
             rustup component add "${component##*:}"
         fi
     done
+fi
+
+# --- browsers ---------------------------------------------------------------------------------------------------
+
+if [ "${1:-}" = web ] || [ "${1:-}" = test ]; then
+    target=wasm32-unknown-unknown
+    if ! [ -d "$(rustc --print target-libdir --target $target)" ]; then
+        if ! { has rustup && rustup target add $target; }; then
+            if [ "$1" = web ]; then
+                stop "Rust cannot compile for browsers here: install its standard library for $target."
+            fi
+            echo "setup: Rust cannot compile for browsers here: the page is not built, and its tests are skipped" >&2
+        fi
+    fi
 fi

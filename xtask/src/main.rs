@@ -5,6 +5,7 @@ mod seams;
 mod skipped;
 mod steps;
 mod tidy;
+mod wasm;
 
 use std::process::ExitCode;
 
@@ -29,7 +30,9 @@ enum Task {
     Test,
     /// Tidiness only: file heads and lengths, links, machine paths, golden images ...
     Tidy,
-    /// Everything: check, the smoke evaluation, test.
+    /// The page, into target/web, and its size.
+    Wasm,
+    /// Everything: check, the page, the smoke evaluation, test.
     Ci,
 }
 
@@ -56,8 +59,15 @@ fn run(task: Task) -> Result<()> {
         Task::Check => runner.run(&check),
         Task::Test => runner.run(&test),
         Task::Tidy => runner.run(&[Step::Tidy]),
+        Task::Wasm => runner.run(&[Step::Page]),
         Task::Ci => {
             runner.run(&check);
+            // Tests open the page in a browser.
+            if wasm::has_target() {
+                runner.run(&[Step::Page]);
+            } else {
+                runner.skip("skipped: the page, Rust cannot compile for browsers here");
+            }
             runner.run(&[Step::Smoke]);
             runner.run(&test);
         }

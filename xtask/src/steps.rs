@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, bail};
 use cargo_metadata::Metadata;
 
-use crate::{seams, skipped, tidy};
+use crate::{seams, skipped, tidy, wasm};
 
 /// One thing that can pass or fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,6 +21,8 @@ pub(crate) enum Step {
     Seams,
     /// See [`tidy`].
     Tidy,
+    /// The page, with what its tests need.
+    Page,
     /// The whole loop on a small scene, by the command itself.
     Smoke,
     /// Documentation examples.
@@ -37,6 +39,7 @@ impl Step {
             Step::ThinClient => "thin client",
             Step::Seams => "seams",
             Step::Tidy => "tidy",
+            Step::Page => "page",
             Step::Smoke => "smoke evaluation",
             Step::DocTests => "documentation examples",
             Step::Tests => "tests",
@@ -70,6 +73,12 @@ impl Runner {
                 }
             }
         }
+    }
+
+    /// Notes that something was left out.
+    pub(crate) fn skip(&mut self, line: &str) {
+        println!("\n{line}");
+        self.skipped.push(line.to_owned());
     }
 
     /// Prints what was skipped, passed and failed; an error if anything failed.
@@ -107,12 +116,20 @@ impl Runner {
             ]),
             Step::Seams => seams::check(&self.metadata),
             Step::Tidy => tidy::check(self.root()),
+            Step::Page => self.page(),
             Step::Smoke => {
                 self.cargo(&["run", "--profile=dev", "--quiet", "--package=dapple", "--", "eval", "--smoke"])
             }
             Step::DocTests => self.cargo(&["test", "--doc", "--workspace", "--all-features"]),
             Step::Tests => self.tests(),
         }
+    }
+
+    fn page(&self) -> Result<()> {
+        wasm::install_driver(self.root());
+        wasm::build(self.root(), self.metadata.target_directory.as_std_path(), |arguments| {
+            self.cargo(arguments)
+        })
     }
 
     fn tests(&mut self) -> Result<()> {
@@ -136,7 +153,7 @@ impl Runner {
         let _ = std::fs::remove_file(&report);
         let outcome = self.cargo(&["nextest", "run", "--workspace", "--all-features"]);
         match std::fs::read_to_string(&report) {
-            Ok(text) => self.skipped = skipped::skipped_lines(&text),
+            Ok(text) => self.skipped.extend(skipped::skipped_lines(&text)),
             Err(error) => eprintln!("cannot list what was skipped: {}: {error}", report.display()),
         }
         outcome

@@ -1,10 +1,16 @@
 //! Command-line arguments.
 
+mod view;
+mod watch;
+
 use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
+
+pub(crate) use view::{Preset, ViewArgs, ViewKind};
+pub(crate) use watch::{DemoArgs, InspectArgs, LightArgs, RecordArgs};
 
 /// Ray-traced ambient visibility, computed once on a server and streamed to thin clients.
 #[derive(Debug, Parser)]
@@ -22,9 +28,24 @@ pub(crate) enum Command {
     /// Render one picture of a scene.
     #[command(after_help = RENDER_EXAMPLES)]
     Render(RenderArgs),
+    /// Compare reconstructions of visibility over all surfaces of a scene, or near thin walls, with traced truth.
+    #[command(after_help = QUALITY_EXAMPLES)]
+    Quality(QualityArgs),
     /// Write a built-in scene as a GLB that any glTF viewer opens.
     #[command(after_help = SCENE_EXAMPLES)]
     Scene(SceneArgs),
+    /// Light a scene along its animation and keep the stream in a .dapple file.
+    #[command(after_help = watch::RECORD_EXAMPLES)]
+    Record(RecordArgs),
+    /// Say what is in a .dapple file, and whether it is whole.
+    #[command(after_help = watch::INSPECT_EXAMPLES)]
+    Inspect(InspectArgs),
+    /// Show a scene and its light in a window, or as pictures without one.
+    #[command(after_help = view::VIEW_EXAMPLES)]
+    View(ViewArgs),
+    /// Serve a built-in scene and its light to browsers on this machine.
+    #[command(after_help = watch::DEMO_EXAMPLES)]
+    Demo(DemoArgs),
 }
 
 const EVAL_EXAMPLES: &str = "\
@@ -42,6 +63,12 @@ Examples:
   dapple render --builtin atrium --time 4 --camera eye=2,1.7,5,target=0,1,0,fov=60 --method rtao -o truth.png
   dapple render city.glb --method psao --points 256 --radius auto --view visibility -o visibility.png
   dapple render --builtin atrium --view error -o error.png        psao against rtao, per pixel";
+
+const QUALITY_EXAMPLES: &str = "\
+Examples:
+  dapple quality                                 the built-in atrium at 256, 512 and 1024 points a square metre
+  dapple quality room.glb --radius auto --points 512 -o room.json
+  dapple quality --leaks                         two made scenes with thin walls";
 
 const SCENE_EXAMPLES: &str = "\
 Examples:
@@ -167,6 +194,35 @@ pub(crate) struct RenderArgs {
     /// The PNG to write.
     #[arg(short, long, value_name = "FILE.png")]
     pub(crate) output: PathBuf,
+    /// Threads; 0 is one for each core.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) threads: usize,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct QualityArgs {
+    #[command(flatten)]
+    pub(crate) scene: SceneChoice,
+    /// Points spawned a square metre (half are kept).
+    #[arg(long, value_delimiter = ',', value_name = "N,…", default_values_t = [256.0, 512.0, 1024.0])]
+    pub(crate) points: Vec<f32>,
+    /// Places on surfaces that are compared, about.
+    #[arg(long, value_name = "N", default_value_t = 40_000)]
+    pub(crate) samples: u32,
+    /// Rays a place of the ray-traced truth.
+    #[arg(long, value_name = "R", default_value_t = 512)]
+    pub(crate) reference_rays: u32,
+    /// Animation time in seconds.
+    #[arg(long, value_name = "T", default_value_t = 2.0, allow_hyphen_values = true)]
+    pub(crate) time: f64,
+    /// Compare near the thin walls of two made scenes instead.
+    #[arg(long, conflicts_with_all = ["scene", "builtin", "detail", "animation", "time", "radius"])]
+    pub(crate) leaks: bool,
+    #[command(flatten)]
+    pub(crate) visibility: VisibilityArgs,
+    /// Write every figure to this file.
+    #[arg(short, long, value_name = "FILE.json")]
+    pub(crate) output: Option<PathBuf>,
     /// Threads; 0 is one for each core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) threads: usize,

@@ -1,15 +1,21 @@
-//! The command `dapple`: evaluate, render, and write scenes.
+//! The command `dapple`: evaluate, render, show, record and serve scenes.
 
 #[macro_use]
 mod say;
 
 mod args;
+mod demo;
 mod eval;
+mod inspect;
+mod light;
+mod page;
 mod picture;
 mod progress;
+mod record;
 mod render;
 mod scene_command;
 mod source;
+mod view;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -39,10 +45,16 @@ fn main() -> ExitCode {
 }
 
 fn run(cli: Cli) -> anyhow::Result<()> {
+    // Windows must be opened on the program's first thread.
+    if let Command::View(args) = &cli.command {
+        return view::run(args);
+    }
     let threads = match &cli.command {
         Command::Eval(args) => args.threads,
         Command::Render(args) => args.threads,
-        Command::Scene(_) => 0,
+        Command::Record(args) => args.threads,
+        Command::Quality(args) => args.threads,
+        Command::Scene(_) | Command::Inspect(_) | Command::Demo(_) | Command::View(_) => 0,
     };
     if threads > 1024 {
         anyhow::bail!("--threads is {threads}, must be 0 (one for each core) to 1024");
@@ -51,6 +63,11 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     pool.install(|| match cli.command {
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
+        Command::Quality(args) => eval::quality::run(&args),
         Command::Scene(args) => scene_command::run(&args),
+        Command::Record(args) => record::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
+        Command::Demo(args) => demo::run(&args),
+        Command::View(args) => view::run(&args),
     })
 }

@@ -11,7 +11,7 @@ use crate::args::{CameraText, Radius, SceneChoice, VisibilityArgs};
 use crate::progress::Bar;
 
 /// The largest scene file that is read.
-const MAX_SCENE_BYTES: u64 = 4 << 30;
+pub(crate) const MAX_SCENE_BYTES: u64 = 4 << 30;
 
 /// A loaded scene and what a user should call it.
 pub(crate) struct Loaded {
@@ -134,7 +134,8 @@ impl Files for Folder {
     }
 }
 
-fn read_limited(path: &Path, limit_bytes: u64) -> std::io::Result<Vec<u8>> {
+/// Reads a whole file of at most so many bytes.
+pub(crate) fn read_limited(path: &Path, limit_bytes: u64) -> std::io::Result<Vec<u8>> {
     let file = std::fs::File::open(path)?;
     let metadata = file.metadata()?;
     if metadata.is_dir() {

@@ -31,7 +31,7 @@ fn folder() -> TempDir {
 fn help_shows_examples() {
     let folder = Path::new(".");
     let top = succeed(folder, &["--help"]);
-    for command in ["eval", "render", "scene"] {
+    for command in ["eval", "render", "scene", "record", "inspect", "view", "demo"] {
         assert!(top.contains(command), "{top}");
         let help = succeed(folder, &[command, "--help"]);
         let examples = help.split_once("Examples:").unwrap().1;

@@ -1,1 +1,21 @@
-//! The viewer in a browser tab: the same client as elsewhere, compiled to WebAssembly, behind a small JavaScript handle.
+//! The client in a browser tab: what the page's JavaScript (`page/dapple.js`) drives.
+//!
+//! ```text
+//! fetch, pointer, keys, frames of the display (JavaScript) ─► Core ─► player (which frame of the stream, when) ─► Viewer ─► canvas
+//! ```
+//!
+//! Requests, events and the clock are the page's; this side owns the canvas, and everything that is counted in points,
+//! pixels and bytes. Only the parts that touch a browser are left out of builds for other targets.
+
+#[cfg(target_arch = "wasm32")]
+mod canvas;
+#[cfg(target_arch = "wasm32")]
+mod core;
+pub mod names;
+pub mod player;
+pub mod rate;
+#[cfg(target_arch = "wasm32")]
+mod steer;
+
+#[cfg(target_arch = "wasm32")]
+pub use crate::core::Core;

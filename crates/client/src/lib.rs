@@ -5,6 +5,9 @@
 //! pose(now), camera ─► g-buffer ──────────────────────────────────────┴─► visibility ─► compose ─► image
 //! ```
 
+pub mod clock;
+pub mod controls;
+pub mod rate;
 #[cfg(feature = "gpu")]
 pub mod viewer;
 

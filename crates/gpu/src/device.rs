@@ -1,6 +1,9 @@
 //! A device, or why there is none and what to do about it.
 
-/// A device with its queue.
+use crate::fault::Faults;
+use crate::{GpuFault, limits};
+
+/// A device with its queue. Clones are handles of the same device.
 #[derive(Clone, Debug)]
 pub struct Gpu {
     /// Where it came from.
@@ -9,6 +12,7 @@ pub struct Gpu {
     pub device: wgpu::Device,
     /// Takes work.
     pub queue: wgpu::Queue,
+    faults: Faults,
 }
 
 /// What kind of device is wanted.
@@ -22,15 +26,63 @@ pub struct GpuOptions {
 #[derive(Debug, thiserror::Error)]
 pub enum GpuError {
     /// No driver offers an adapter.
-    #[error("gpu: no adapter: {0}")]
-    NoAdapter(#[from] wgpu::RequestAdapterError),
+    #[error("gpu: there is no graphics adapter: {source}. {}", advice(.has_surface))]
+    NoAdapter {
+        /// What wgpu tried.
+        source: wgpu::RequestAdapterError,
+        /// Whether it had to present to a surface.
+        has_surface: bool,
+    },
+    /// The adapter has less than every pass needs.
+    #[error(
+        "gpu: {adapter} is too small: {missing}. At least what WebGL2 guarantees is needed; update the driver, or choose \
+         another adapter by the variable WGPU_ADAPTER_NAME"
+    )]
+    TooSmall {
+        /// Which adapter.
+        adapter: String,
+        /// Which limits, each as `name is value, value needed`.
+        missing: String,
+    },
     /// The adapter refuses a device.
-    #[error("gpu: no device: {0}")]
-    NoDevice(#[from] wgpu::RequestDeviceError),
+    #[error(
+        "gpu: {adapter} refuses a device: {source}. Update the driver, close programs that hold its memory, or choose \
+         another adapter by the variable WGPU_ADAPTER_NAME"
+    )]
+    NoDevice {
+        /// Which adapter.
+        adapter: String,
+        /// Why.
+        source: wgpu::RequestDeviceError,
+    },
+}
+
+fn advice(has_surface: &bool) -> String {
+    let mut advice = String::from(if cfg!(target_arch = "wasm32") {
+        "Use a browser with WebGPU (Chrome or Edge 113, Safari 26, Firefox 141, or newer) or WebGL2 (any of the last \
+         years), and switch hardware acceleration on in its settings"
+    } else if cfg!(target_os = "linux") {
+        "Install the Vulkan driver of the graphics card's vendor; without a card, Debian's and Ubuntu's package \
+         mesa-vulkan-drivers draws on the processor (Fedora: mesa-vulkan-drivers, Arch: vulkan-swrast). A container \
+         needs the device files of /dev/dri too"
+    } else if cfg!(target_os = "windows") {
+        "Install the driver of the graphics card's vendor (Direct3D 12 or Vulkan)"
+    } else {
+        "Metal or Vulkan is needed: update the system"
+    });
+    if *has_surface {
+        advice.push_str(". Drawing without a window may work where drawing into one does not");
+    }
+    advice
 }
 
 impl Gpu {
-    /// Asks for a device of `instance` that can present to `surface`, if one is given.
+    /// Asks for a device of `instance` that can present to `surface`, if one is given. Its limits are those of WebGL2,
+    /// raised to the adapter's where passes make use of more: sizes and layers of textures, sizes of buffers, storage
+    /// buffers.
+    ///
+    /// # Errors
+    /// No adapter, one that is too small, or one that refuses; each says what to do.
     pub async fn request(
         instance: &wgpu::Instance,
         surface: Option<&wgpu::Surface<'_>>,
@@ -47,13 +99,83 @@ impl Gpu {
                 compatible_surface: surface,
                 ..Default::default()
             })
-            .await?;
-        let (device, queue) = adapter
-            .request_device(&wgpu::DeviceDescriptor {
-                required_limits: wgpu::Limits::downlevel_webgl2_defaults().using_resolution(adapter.limits()),
-                ..Default::default()
-            })
-            .await?;
-        Ok(Gpu { adapter, device, queue })
+            .await
+            .map_err(|source| GpuError::NoAdapter { source, has_surface: surface.is_some() })?;
+        Gpu::from_adapter(adapter).await
     }
+
+    /// A device without any surface, for tests, servers and pictures in files.
+    ///
+    /// # Errors
+    /// As [`Gpu::request`].
+    pub async fn headless() -> Result<Gpu, GpuError> {
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+        Gpu::request(&instance, None, &GpuOptions::default()).await
+    }
+
+    /// A device of an adapter that was chosen elsewhere.
+    ///
+    /// # Errors
+    /// An adapter that is too small or refuses.
+    pub async fn from_adapter(adapter: wgpu::Adapter) -> Result<Gpu, GpuError> {
+        let offered = adapter.limits();
+        let required = limits::wanted(&offered);
+        if let Some(missing) = limits::missing(&required, &offered) {
+            return Err(GpuError::TooSmall { adapter: describe(&adapter), missing });
+        }
+        let request = adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("dapple"),
+            required_limits: required,
+            ..Default::default()
+        });
+        let (device, queue) = match request.await {
+            Ok(pair) => pair,
+            Err(source) => return Err(GpuError::NoDevice { adapter: describe(&adapter), source }),
+        };
+        let faults = Faults::watch(&device);
+        Ok(Gpu { adapter, device, queue, faults })
+    }
+
+    /// One line for logs and overlays: adapter, kind, interface, driver.
+    pub fn description(&self) -> String {
+        describe(&self.adapter)
+    }
+
+    /// The first thing that went wrong on the device since this was last asked: a rejected call, memory, or the loss of
+    /// the device. Ask once a frame: whoever does not ask sees a black picture at worst, and why in the log.
+    pub fn take_fault(&self) -> Option<GpuFault> {
+        self.faults.take()
+    }
+
+    /// Whether fragment shaders can read storage buffers (not on WebGL2).
+    pub fn has_storage_buffers(&self) -> bool {
+        let limits = self.device.limits();
+        limits.max_storage_buffers_per_shader_stage >= 4 && limits.max_storage_buffer_binding_size > 0
+    }
+
+    /// Whether textures can be read through a view of another format than their own (not on WebGL2).
+    pub fn has_view_formats(&self) -> bool {
+        self.adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::VIEW_FORMATS)
+    }
+}
+
+fn describe(adapter: &wgpu::Adapter) -> String {
+    let info = adapter.get_info();
+    let kind = match info.device_type {
+        wgpu::DeviceType::DiscreteGpu => "graphics card",
+        wgpu::DeviceType::IntegratedGpu => "integrated graphics",
+        wgpu::DeviceType::VirtualGpu => "virtual graphics card",
+        wgpu::DeviceType::Cpu => "processor",
+        wgpu::DeviceType::Other => "unknown kind",
+    };
+    let name = if info.name.is_empty() { "unnamed adapter" } else { &info.name };
+    let mut line = format!("{name} ({kind}, {}", info.backend);
+    for part in [&info.driver, &info.driver_info] {
+        if !part.is_empty() {
+            line.push_str(", ");
+            line.push_str(part);
+        }
+    }
+    line.push(')');
+    line
 }

@@ -18,6 +18,8 @@ mod testing;
 mod texture;
 
 pub mod compose;
+#[cfg(feature = "gpu")]
+pub mod forward;
 pub mod gbuffer;
 pub mod image;
 pub mod psao;

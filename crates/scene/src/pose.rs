@@ -15,6 +15,8 @@ pub struct Pose {
     pub world_from_node: Vec<Affine3A>,
     /// One for each of [`crate::Scene::instances`].
     pub instances: Vec<PosedInstance>,
+    /// One list for each of [`crate::Scene::instances`]: weights of its mesh's morph targets, empty where it has none.
+    pub morph_weights: Vec<Vec<f32>>,
     /// Every placed light, in node order.
     pub lights: Vec<PosedLight>,
     /// Every placed camera, in node order, with its index into [`crate::Scene::cameras`].
@@ -26,7 +28,8 @@ pub struct Pose {
 pub struct PosedInstance {
     /// World from mesh space; the identity for skinned instances, whose vertices are posed in the world.
     pub world_from_mesh: Affine3A,
-    /// Vertices that replace the mesh's, for skinned and morphed instances.
+    /// Vertices that replace the mesh's, for skinned and morphed instances; `None` for all others, and for all in a
+    /// pose of [`crate::Scene::pose_undeformed`].
     pub deformed: Option<Arc<DeformedMesh>>,
 }
 

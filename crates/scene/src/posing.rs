@@ -6,7 +6,7 @@ use glam::{Affine3A, Mat3, Mat3A, Quat, Vec3, Vec3A};
 
 use crate::{
     Aabb, ChannelTarget, DeformedMesh, Instance, LocalTransform, Mesh, Pose, PosedCamera, PosedInstance,
-    PosedLight, Scene,
+    PosedLight, Scene, Skin,
 };
 
 /// Default ray length as a part of the scene's diagonal.
@@ -25,6 +25,21 @@ impl Scene {
     /// Everything that moves, at `time_s` seconds. The active animation plays in a loop. A function of the scene
     /// and the time alone, the same on every machine.
     pub fn pose(&self, time_s: f64) -> Pose {
+        self.pose_with(time_s, true)
+    }
+
+    /// As [`Scene::pose`], but no vertex is visited: `deformed` is `None` throughout. For those who skin and morph
+    /// by themselves, from `world_from_node` (see [`Scene::world_from_bind`]) and `morph_weights`.
+    pub fn pose_undeformed(&self, time_s: f64) -> Pose {
+        self.pose_with(time_s, false)
+    }
+
+    /// Where each joint of a skin brings the mesh at bind time, in the world.
+    pub fn world_from_bind(&self, pose: &Pose, skin: usize) -> Vec<Affine3A> {
+        bind_transforms(&self.skins[skin], &pose.world_from_node)
+    }
+
+    fn pose_with(&self, time_s: f64, deform: bool) -> Pose {
         let animated = self.animate(time_s);
         let mut world_from_node = self.node_transforms(&animated);
         for world in &mut world_from_node {
@@ -33,10 +48,11 @@ impl Scene {
                 *world = Affine3A::from_scale(Vec3::ZERO);
             }
         }
-        let instances = self
-            .instances
-            .iter()
-            .map(|instance| self.pose_instance(instance, &world_from_node, &animated))
+        let morph_weights: Vec<Vec<f32>> =
+            self.instances.iter().map(|instance| self.morph_weights(instance, &animated)).collect();
+        let posed = self.instances.iter().zip(&morph_weights);
+        let instances = posed
+            .map(|(instance, weights)| self.pose_instance(instance, &world_from_node, weights, deform))
             .collect();
         let mut lights = Vec::new();
         let mut cameras = Vec::new();
@@ -51,7 +67,7 @@ impl Scene {
                 cameras.push((camera, PosedCamera { world_from_view: without_scale(world), projection }));
             }
         }
-        Pose { time: time_s, world_from_node, instances, lights, cameras }
+        Pose { time: time_s, world_from_node, instances, morph_weights, lights, cameras }
     }
 
     /// The vertices of an instance: posed if it deforms, else its mesh's. In the space that the pose's
@@ -132,26 +148,33 @@ impl Scene {
         self.node_transforms(&self.animate(time_s)).iter().position(|world| !world.is_finite())
     }
 
+    /// Weights of an instance's morph targets: the animation's, else the node's, else the mesh's.
+    fn morph_weights(&self, instance: &Instance, animated: &[Animated]) -> Vec<f32> {
+        let mesh = &self.meshes[instance.mesh as usize];
+        if mesh.morph_targets.is_empty() {
+            return Vec::new();
+        }
+        let node = &self.nodes[instance.node as usize];
+        let playing = animated.get(instance.node as usize).and_then(|values| values.morph_weights.as_ref());
+        let still = if node.morph_weights.is_empty() { &mesh.morph_weights } else { &node.morph_weights };
+        playing.unwrap_or(still).clone()
+    }
+
     fn pose_instance(
         &self,
         instance: &Instance,
         world_from_node: &[Affine3A],
-        animated: &[Animated],
+        morph_weights: &[f32],
+        deform: bool,
     ) -> PosedInstance {
         let mesh = &self.meshes[instance.mesh as usize];
-        let node = &self.nodes[instance.node as usize];
-        let morphed = (!mesh.morph_targets.is_empty()).then(|| {
-            let playing =
-                animated.get(instance.node as usize).and_then(|values| values.morph_weights.as_deref());
-            let still = if node.morph_weights.is_empty() { &mesh.morph_weights } else { &node.morph_weights };
-            morph(mesh, playing.unwrap_or(still))
-        });
+        let morphed = (deform && !mesh.morph_targets.is_empty()).then(|| morph(mesh, morph_weights));
         match instance.skin {
+            Some(_) if !mesh.influences.is_empty() && !deform => {
+                PosedInstance { world_from_mesh: Affine3A::IDENTITY, deformed: None }
+            }
             Some(skin) if !mesh.influences.is_empty() => {
-                let skin = &self.skins[skin as usize];
-                let joints = skin.joints.iter().zip(&skin.inverse_bind_matrices);
-                let world_from_bind: Vec<Affine3A> =
-                    joints.map(|(&joint, bind)| world_from_node[joint as usize] * *bind).collect();
+                let world_from_bind = bind_transforms(&self.skins[skin as usize], world_from_node);
                 let deformed = match &morphed {
                     Some(morphed) => {
                         skin_vertices(mesh, &morphed.positions, &morphed.normals, &world_from_bind)
@@ -166,6 +189,11 @@ impl Scene {
             },
         }
     }
+}
+
+fn bind_transforms(skin: &Skin, world_from_node: &[Affine3A]) -> Vec<Affine3A> {
+    let joints = skin.joints.iter().zip(&skin.inverse_bind_matrices);
+    joints.map(|(&joint, bind)| world_from_node[joint as usize] * *bind).collect()
 }
 
 /// Rotation and place of a transform, for cameras: the view axis is kept, up as near as possible.

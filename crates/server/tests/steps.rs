@@ -141,7 +141,7 @@ fn subscribers_are_brought_up_to_date_by_one_snapshot() {
 
 #[test]
 fn progress_reaches_its_end() {
-    let (laid, traced, all) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicUsize::new(0));
+    let [laid, traced, all, cut] = [const { AtomicUsize::new(0) }; 4];
     let server = Server::new(scene(), &config(4), &|progress| match progress {
         Progress::Laying(done, of) => {
             assert_eq!(of, 2);
@@ -151,9 +151,14 @@ fn progress_reaches_its_end() {
             all.store(of, Ordering::Relaxed);
             traced.fetch_max(done, Ordering::Relaxed);
         }
+        Progress::Cutting(done, of) => {
+            assert!(of > 0);
+            cut.fetch_max(done, Ordering::Relaxed);
+        }
     })
     .unwrap();
     assert_eq!(laid.into_inner(), 2);
+    assert!(cut.into_inner() > 0);
     assert_eq!(all.into_inner(), server.store().layout().len());
     assert_eq!(traced.into_inner(), server.store().layout().len());
     assert!((20.0..200.0).contains(&server.bytes_per_point()), "{}", server.bytes_per_point());

@@ -2,7 +2,8 @@
 //!
 //! A [`Publisher`] (feature `zstd`) turns the states of a [`PointStore`](dapple_store::points::PointStore) into
 //! [`Frame`]s; a [`Subscriber`] turns any bytes back into the same store, bit for bit, or names what is wrong
-//! with them. The frames are specified in `docs/wire.md`; [`codec`] is the bits, [`session`] the order.
+//! with them. The frames are specified in `docs/wire.md`; [`codec`] is the bits, [`session`] the order. Frames kept
+//! in a file are a [`recording`].
 
 #![cfg_attr(
     test,
@@ -10,9 +11,11 @@
 )]
 
 pub mod codec;
+pub mod recording;
 pub mod session;
 
 pub use codec::{DecodeError, FrameHeader, FrameKind, Limits};
+pub use recording::{Recorder, Recording, RecordingError, RecordingHeader, Replay};
 pub use session::{Applied, IgnoreReason, ReceiveError, Subscriber, ValueChange};
 #[cfg(feature = "zstd")]
 pub use session::{Frame, PublishError, Publisher, PublisherConfig};

@@ -1,11 +1,14 @@
 //! `dapple eval`: server and client in one process along a camera path, against ray-traced truth.
 
+pub(crate) mod quality;
 mod report;
 mod results;
 mod run;
+mod samples;
 mod settings;
 mod smoke;
 mod table;
+mod thin;
 
 use anyhow::Result;
 

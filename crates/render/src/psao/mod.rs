@@ -3,9 +3,12 @@
 //! Takes the store's points and fragments in rest space; returns one visibility a fragment. See `README.md`.
 
 pub mod atlas;
+pub mod cells;
+pub mod hash;
 mod hat;
 mod index;
 mod mls;
+mod tables;
 #[cfg(test)]
 mod tests;
 
@@ -16,6 +19,9 @@ use crate::gbuffer::RestSurface;
 pub use dapple_store::charts::MovingLeastSquares;
 pub use hat::Hat;
 pub use index::PointIndex;
+#[cfg(feature = "gpu")]
+pub use tables::TableTextures;
+pub use tables::{TABLE_WIDTH, TableError};
 
 /// How values of points near a fragment become its visibility.
 #[derive(Clone, Copy, Debug, PartialEq)]

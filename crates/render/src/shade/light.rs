@@ -6,17 +6,17 @@ use glam::{Vec2, Vec3};
 use super::ShadeParams;
 
 /// A light in the world, ready to be evaluated.
-pub(super) struct ActiveLight {
-    pub(super) kind: LightKind,
-    pub(super) position_world: Vec3,
+pub(crate) struct ActiveLight {
+    pub(crate) kind: LightKind,
+    pub(crate) position_world: Vec3,
     /// Unit, from the light.
-    pub(super) direction_world: Vec3,
-    pub(super) throws_shadow: bool,
+    pub(crate) direction_world: Vec3,
+    pub(crate) throws_shadow: bool,
     /// Candela or lux, RGB.
-    intensity: Vec3,
-    range: Option<f32>,
+    pub(crate) intensity: Vec3,
+    pub(crate) range: Option<f32>,
     /// Scale and offset of the cosine that fades a spot light.
-    cone: (f32, f32),
+    pub(crate) cone: (f32, f32),
 }
 
 /// Light that arrives at a place.
@@ -74,7 +74,7 @@ fn cosine(angle: f32) -> f32 {
 }
 
 /// The lights that shine, in the pose's order; the default sun and its fill if there are none.
-pub(super) fn active_lights(scene: &Scene, pose: &Pose, params: &ShadeParams) -> Vec<ActiveLight> {
+pub(crate) fn active_lights(scene: &Scene, pose: &Pose, params: &ShadeParams) -> Vec<ActiveLight> {
     let placed = pose.lights.iter().filter_map(|p| Some((scene.lights.get(p.light as usize)?, p)));
     let lights: Vec<ActiveLight> = placed
         .enumerate()

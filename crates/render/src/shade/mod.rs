@@ -15,8 +15,12 @@ use rayon::prelude::*;
 use crate::gbuffer::{GBuffer, Surface};
 use crate::texture;
 use brdf::Reflectance;
-use light::ActiveLight;
 pub use light::light_irradiance;
+pub(crate) use light::{ActiveLight, active_lights};
+#[cfg(all(test, feature = "gpu"))]
+pub(crate) use shadow::SHADOW_FILTER;
+#[cfg(feature = "gpu")]
+pub(crate) use shadow::{Face, Lens, faces_of};
 pub use shadow::{ShadowMaps, render_shadow_maps};
 
 /// How to shade. The defaults suit scenes of white walls about 1 cd/m² bright.
@@ -95,7 +99,7 @@ pub fn shade(
     shadow_maps: &ShadowMaps,
     params: &ShadeParams,
 ) -> Shaded {
-    let lights = light::active_lights(scene, pose, params);
+    let lights = active_lights(scene, pose, params);
     let eye_world = camera.eye_world();
     let axis_world = camera.world_from_view.transform_vector3(Vec3::Z).normalize_or_zero();
     let shade_one = |i: usize| -> (Vec3, Vec3) {

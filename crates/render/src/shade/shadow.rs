@@ -20,6 +20,10 @@ const SLACK: (f32, f32) = (0.02, 1e-5);
 /// The receiver's plane may rise by so many texels at a tap.
 const STEEPEST_TEXELS: f32 = 16.0;
 
+/// The filter's constants, for comparing them with the shader's.
+#[cfg(all(test, feature = "gpu"))]
+pub(crate) const SHADOW_FILTER: ((f32, f32), f32) = (NORMAL_OFFSET_TEXELS, STEEPEST_TEXELS);
+
 /// Distances from the lights of a scene in one pose. Made by [`render_shadow_maps`].
 #[derive(Clone, Debug, Default)]
 pub struct ShadowMaps {
@@ -29,12 +33,12 @@ pub struct ShadowMaps {
 
 /// One square map.
 #[derive(Clone, Debug)]
-struct Face {
-    view_from_world: Affine3A,
+pub(crate) struct Face {
+    pub(crate) view_from_world: Affine3A,
     /// Half the extent in x and y: metres, or tangents of the half angles in a perspective.
-    extent: [f32; 2],
-    perspective: bool,
-    resolution: u32,
+    pub(crate) extent: [f32; 2],
+    pub(crate) perspective: bool,
+    pub(crate) resolution: u32,
     /// Distance along the view axis (metres) of what is nearest to the light, infinite where there is nothing.
     distances: Vec<f32>,
 }
@@ -50,31 +54,44 @@ pub fn render_shadow_maps(scene: &Scene, pose: &Pose, params: &ShadeParams) -> S
     }
     let casters = caster_positions(scene, pose);
     let diagonal = Aabb::from_points(casters.iter().copied()).diagonal();
-    let resolution = params.shadow_resolution.clamp(16, 8192);
     let faces = lights.iter().map(|light| {
-        if !(light.throws_shadow && diagonal > 0.0 && diagonal.is_finite()) {
-            return Vec::new();
-        }
-        // Reverse z keeps its precision when the near plane is near.
-        let near = (1e-3 * diagonal).clamp(1e-4, 0.02);
-        match light.kind {
-            LightKind::Directional => directional_face(light, &casters, resolution).into_iter().collect(),
-            LightKind::Spot { outer_cone_angle, .. } if outer_cone_angle <= WIDEST_SPOT => {
-                let tangent = libm::tanf(outer_cone_angle.max(1e-3));
-                vec![perspective_face(light, light.direction_world, tangent, near, resolution)]
-            }
-            LightKind::Spot { .. } | LightKind::Point => {
-                let axes = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
-                let resolution = (resolution / 2).max(16);
-                axes.map(|axis| perspective_face(light, axis, 1.0, near, resolution)).into()
-            }
-        }
+        faces_of(light, params.shadow_resolution, diagonal, |view_from_world| {
+            Aabb::from_points(casters.iter().map(|&p| view_from_world.transform_point3(p)))
+        })
     });
     let mut faces: Vec<Vec<(Face, Lens)>> = faces.collect();
     for (face, lens) in faces.iter_mut().flatten() {
         face.render(scene, pose, lens);
     }
     ShadowMaps { faces: faces.into_iter().map(|f| f.into_iter().map(|(face, _)| face).collect()).collect() }
+}
+
+/// The maps that a light needs, still empty: none if it throws no shadow. `diagonal_m` is that of the box around all
+/// casters in the world; `bounds_of` gives the box around them in the space of the map it is given.
+pub(crate) fn faces_of(
+    light: &ActiveLight,
+    resolution: u32,
+    diagonal_m: f32,
+    bounds_of: impl FnOnce(&Affine3A) -> Aabb,
+) -> Vec<(Face, Lens)> {
+    if !(light.throws_shadow && diagonal_m > 0.0 && diagonal_m.is_finite()) {
+        return Vec::new();
+    }
+    let resolution = resolution.clamp(16, 8192);
+    // Reverse z keeps its precision when the near plane is near.
+    let near = (1e-3 * diagonal_m).clamp(1e-4, 0.02);
+    match light.kind {
+        LightKind::Directional => directional_face(light, bounds_of, resolution).into_iter().collect(),
+        LightKind::Spot { outer_cone_angle, .. } if outer_cone_angle <= WIDEST_SPOT => {
+            let tangent = libm::tanf(outer_cone_angle.max(1e-3));
+            vec![perspective_face(light, light.direction_world, tangent, near, resolution)]
+        }
+        LightKind::Spot { .. } | LightKind::Point => {
+            let axes = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
+            let resolution = (resolution / 2).max(16);
+            axes.map(|axis| perspective_face(light, axis, 1.0, near, resolution)).into()
+        }
+    }
 }
 
 /// Posed vertices of everything that casts.
@@ -93,9 +110,23 @@ fn caster_positions(scene: &Scene, pose: &Pose) -> Vec<Vec3> {
 }
 
 /// How reverse-z depths of a face become distances.
-enum Lens {
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Lens {
     Perspective { near: f32 },
     Orthographic { near: f32, far: f32 },
+}
+
+impl Lens {
+    /// Clip space from the view of a face with the given half extents.
+    pub(crate) fn clip_from_view(&self, extent: [f32; 2]) -> DMat4 {
+        let [x, y] = extent.map(f64::from);
+        match *self {
+            Lens::Perspective { near } => projection::perspective(1.0 / x, 1.0 / y, f64::from(near)),
+            Lens::Orthographic { near, far } => {
+                projection::orthographic(x, y, f64::from(near), f64::from(far))
+            }
+        }
+    }
 }
 
 /// A rotation that looks along `forward` (view −Z).
@@ -120,10 +151,14 @@ fn perspective_face(
 }
 
 /// A box around the casters along the light.
-fn directional_face(light: &ActiveLight, casters: &[Vec3], resolution: u32) -> Option<(Face, Lens)> {
+fn directional_face(
+    light: &ActiveLight,
+    bounds_of: impl FnOnce(&Affine3A) -> Aabb,
+    resolution: u32,
+) -> Option<(Face, Lens)> {
     let turned = world_from_view(light.direction_world, Vec3::ZERO);
     let view_from_world = turned.inverse();
-    let bounds = Aabb::from_points(casters.iter().map(|&p| view_from_world.transform_point3(p)));
+    let bounds = bounds_of(&view_from_world);
     if bounds.is_empty() {
         return None;
     }
@@ -166,13 +201,7 @@ impl<'a> Sink for DepthSink<'a> {
 
 impl Face {
     fn render(&mut self, scene: &Scene, pose: &Pose, lens: &Lens) {
-        let [x, y] = self.extent.map(f64::from);
-        let clip_from_view = match *lens {
-            Lens::Perspective { near } => projection::perspective(1.0 / x, 1.0 / y, f64::from(near)),
-            Lens::Orthographic { near, far } => {
-                projection::orthographic(x, y, f64::from(near), f64::from(far))
-            }
-        };
+        let clip_from_view = lens.clip_from_view(self.extent);
         let clip_from_world = clip_from_view * DMat4::from(projection::widen(&self.view_from_world));
         let view = View { clip_from_world, columns: self.resolution, rows: self.resolution };
         let mut depths = vec![0.0f32; self.resolution as usize * self.resolution as usize];

@@ -171,3 +171,32 @@ fn hash_follows_content_but_not_names() {
     animate(&mut scene, 0, ChannelTarget::Translation, &[0.0], &[0.0; 3]);
     assert_ne!(scene.hash(), moved);
 }
+
+#[test]
+fn an_undeformed_pose_has_all_that_deforming_needs() {
+    let nodes = vec![node(None, trs(Vec3::X, Quat::IDENTITY, Vec3::splat(2.0)))];
+    let mut scene = scene(nodes, triangle(), 0, None);
+    scene.meshes[0].morph_targets = vec![MorphTarget { positions: vec![Vec3::Y; 3], normals: Vec::new() }];
+    scene.meshes[0].morph_weights = vec![0.25];
+    let (full, light) = (scene.pose(0.0), scene.pose_undeformed(0.0));
+    assert_eq!(full.morph_weights, [[0.25]]);
+    assert_eq!(light.morph_weights, full.morph_weights);
+    assert!(full.instances[0].deformed.is_some() && light.instances[0].deformed.is_none());
+    assert_eq!(light.instances[0].world_from_mesh, full.instances[0].world_from_mesh);
+    scene.nodes[0].morph_weights = vec![0.5];
+    assert_eq!(scene.pose(0.0).morph_weights, [[0.5]]);
+
+    scene.skins.push(Skin {
+        name: String::new(),
+        joints: vec![0],
+        inverse_bind_matrices: vec![Affine3A::from_translation(Vec3::Y)],
+    });
+    scene.instances[0].skin = Some(0);
+    scene.meshes[0].influences =
+        vec![SkinInfluences { joints: vec![[0; 4]; 3], weights: vec![[1.0, 0.0, 0.0, 0.0]; 3] }];
+    let light = scene.pose_undeformed(0.0);
+    assert_eq!(light.instances[0].world_from_mesh, Affine3A::IDENTITY, "skins pose in the world");
+    let bind = scene.world_from_bind(&light, 0)[0];
+    // A lift of 1 at bind time, then doubled and moved along x.
+    assert!(bind.transform_point3(Vec3::ZERO).abs_diff_eq(Vec3::new(1.0, 2.0, 0.0), 1e-6));
+}

@@ -16,6 +16,9 @@ const MOST_RANGE: f64 = 2.0;
 /// Triangles dropped from charts for each of the mesh; beyond, charts may keep what lies over each other.
 const MOST_DROPPED: usize = 8;
 
+/// Edge of the cells that growth tells layers apart by, texels.
+const GROWTH_CELL: f64 = 2.0;
+
 /// A mean normal closer to the seed's than this (1.8°) is not worth growing again for.
 const SAME_AXIS: f64 = 0.9995;
 
@@ -147,7 +150,7 @@ impl Grower<'_> {
         self.cells.clear();
         let mut triangles = vec![seed];
         self.seen[seed as usize] = self.stamp;
-        self.claim_in(seed, corners, &frame, texel);
+        self.claim_cells(seed, corners, &frame, texel);
         let mut next = 0;
         while next < triangles.len() {
             for neighbour in surface.neighbours[triangles[next] as usize] {
@@ -163,7 +166,7 @@ impl Grower<'_> {
                 let [own_low, own_high] = bounds(corners);
                 let (new_low, new_high) = (low.min(own_low), high.max(own_high));
                 if (new_high - new_low).max_element() > longest
-                    || !self.claim_in(neighbour, corners, &frame, texel)
+                    || !self.claim_cells(neighbour, corners, &frame, texel)
                 {
                     continue;
                 }
@@ -175,37 +178,44 @@ impl Grower<'_> {
         Grown { triangles, frame, texel }
     }
 
-    /// [`Grower::claim`] in the frame that a chart grows in.
-    fn claim_in(&mut self, triangle: u32, corners: [DVec3; 3], frame: &Frame, texel: f64) -> bool {
+    /// Takes the cells under a triangle, of [`GROWTH_CELL`] texels a side, in the frame that a chart grows in. Tells
+    /// layers apart at little cost; [`Grower::settle`] looks closer.
+    fn claim_cells(&mut self, triangle: u32, corners: [DVec3; 3], frame: &Frame, texel: f64) -> bool {
         let normal = self.surface.normals[triangle as usize];
         let normal = DVec3::from_array(frame.axes.map(|axis| axis.dot(normal)));
-        let corners = corners.map(|p| (p.truncate() / texel).extend(p.z));
-        self.claim(corners, normal, DVec2::splat(texel), texel)
+        let cell = GROWTH_CELL * texel;
+        let claim = Claim { step: DVec2::splat(cell), reach: 0.5, range: f64::INFINITY, texel };
+        self.claim(corners.map(|p| (p.truncate() / cell).extend(p.z)), normal, &claim)
     }
 
     /// Takes the texels of a triangle; false, and nothing is taken, if one of them is at another height already.
     ///
-    /// `corners` are x and y in texels, whose edges are `step`, and height. Two places of a surface inside the cone can
-    /// differ in height by no more than its steepness times their distance; and one texel cannot stand for places
-    /// that lie far apart, be they ever so close to each other seen from above.
-    fn claim(&mut self, corners: [DVec3; 3], normal: DVec3, step: DVec2, texel: f64) -> bool {
+    /// `corners` are x and y in texels, and height. Two places of a surface inside the cone can differ in height by no
+    /// more than its steepness times their distance; and one texel cannot stand for places that lie far apart, be they
+    /// ever so close to each other seen from above.
+    fn claim(&mut self, corners: [DVec3; 3], normal: DVec3, claim: &Claim) -> bool {
+        let &Claim { step, reach, range: most_range, texel } = claim;
         // Height gained by one texel along x and y.
         let slope = -normal.truncate() * step / normal.z;
         let height_at = |p: DVec2| corners[0].z + slope.dot(p - corners[0].truncate());
         self.cells.begin();
-        let (cells, steepness) = (&mut self.cells, self.steepness);
-        let fits = touched(corners.map(|c| c.truncate()), |x, y, closest| {
+        let cells = &mut self.cells;
+        let steepness_squared = self.steepness * self.steepness;
+        let fits = touched(corners.map(|c| c.truncate()), reach, |x, y, closest| {
             let height = height_at(closest);
             let over_centre = height_at(DVec2::new(f64::from(x), f64::from(y)));
-            let Some(cell) = cells.get_or_insert((x, y), Cell { closest, height, range: [over_centre; 2] })
+            let Some(slot) = cells.find_or_insert((x, y), Cell { closest, height, range: [over_centre; 2] })
             else {
                 return true;
             };
-            let allowed = steepness * ((closest - cell.closest) * step).length() + HEIGHT_TOLERANCE * texel;
+            let cell = cells.values[slot];
             let range = [cell.range[0].min(over_centre), cell.range[1].max(over_centre)];
-            let fits = (height - cell.height).abs() <= allowed && range[1] - range[0] <= MOST_RANGE * texel;
+            let apart = (height - cell.height).abs() - HEIGHT_TOLERANCE * texel;
+            let distance_squared = ((closest - cell.closest) * step).length_squared();
+            let is_near = apart <= 0.0 || apart * apart <= steepness_squared * distance_squared;
+            let fits = is_near && range[1] - range[0] <= most_range;
             if fits && range != cell.range {
-                cells.replace((x, y), Cell { range, ..cell });
+                cells.replace(slot, Cell { range, ..cell });
             }
             fits
         });
@@ -220,6 +230,8 @@ impl Grower<'_> {
         let flat = flatten(self.surface, &chart, self.params.max_side);
         self.cells.clear();
         let before = chart.triangles.len();
+        let claim =
+            Claim { step: flat.step, reach: 1.0, range: MOST_RANGE * chart.texel, texel: chart.texel };
         let mut triangles = std::mem::take(&mut chart.triangles);
         triangles.retain(|&t| {
             let normal = self.surface.normals[t as usize];
@@ -229,7 +241,7 @@ impl Grower<'_> {
                 let offset = DVec2::new(f64::from(x), f64::from(y)) / f64::from(TEXEL_FRACTION) - 0.5;
                 offset.extend(flat.frame.project(place).z)
             });
-            self.claim(corners, normal, flat.step, chart.texel) || self.dropped >= self.most_dropped
+            self.claim(corners, normal, &claim) || self.dropped >= self.most_dropped
         });
         self.dropped += before - triangles.len();
         chart.triangles = triangles;
@@ -240,6 +252,18 @@ impl Grower<'_> {
 fn bounds(corners: [DVec3; 3]) -> [DVec2; 2] {
     let [a, b, c] = corners.map(|c| c.truncate());
     [a.min(b).min(c), a.max(b).max(c)]
+}
+
+/// How texels are taken.
+struct Claim {
+    /// Edges of a texel along x and y.
+    step: DVec2,
+    /// How far beyond a triangle texels are taken, in texels.
+    reach: f64,
+    /// Most that heights over one centre may differ.
+    range: f64,
+    /// Edge of a texel that tolerances are measured in.
+    texel: f64,
 }
 
 /// What lies over a texel.
@@ -301,13 +325,14 @@ impl Cells {
         }
     }
 
-    fn get_or_insert(&mut self, texel: (i32, i32), cell: Cell) -> Option<Cell> {
+    /// The slot of a texel that is there; otherwise inserts it.
+    fn find_or_insert(&mut self, texel: (i32, i32), cell: Cell) -> Option<usize> {
         if self.used.len() * 2 >= self.keys.len() {
             self.double();
         }
         let slot = self.slot_of(texel);
         if self.keys[slot].0 == self.generation {
-            return Some(self.values[slot]);
+            return Some(slot);
         }
         self.keys[slot] = (self.generation, texel);
         self.values[slot] = cell;
@@ -315,9 +340,8 @@ impl Cells {
         None
     }
 
-    /// Replaces the cell of a texel that is there.
-    fn replace(&mut self, texel: (i32, i32), cell: Cell) {
-        let slot = self.slot_of(texel);
+    /// Replaces the cell of a slot in use.
+    fn replace(&mut self, slot: usize, cell: Cell) {
         self.replaced.push((slot as u32, std::mem::replace(&mut self.values[slot], cell)));
     }
 

@@ -2,22 +2,26 @@
 
 use glam::DVec2;
 
-/// Visits every texel (centre of texel *i* at coordinate *i*) that lies less than one texel, along x and along y, from
-/// some place of the triangle: exactly those a bilinear read inside it gives weight. `visit` gets the texel's x, y and
+/// Visits every texel (centre of texel *i* at coordinate *i*) that lies less than `reach` texels, along x and along y,
+/// from some place of the triangle: for 1, exactly those a bilinear read inside it gives weight. `visit` gets the texel's x, y and
 /// the place of the triangle closest to its centre. Triangles may be of any winding, or flat.
 ///
 /// Rows ascend, and within a row x ascends. Returns early, with false, when `visit` returns false.
-pub(super) fn touched(triangle: [DVec2; 3], mut visit: impl FnMut(i32, i32, DVec2) -> bool) -> bool {
+pub(super) fn touched(
+    triangle: [DVec2; 3],
+    reach: f64,
+    mut visit: impl FnMut(i32, i32, DVec2) -> bool,
+) -> bool {
     let low = triangle[0].min(triangle[1]).min(triangle[2]);
     let high = triangle[0].max(triangle[1]).max(triangle[2]);
     let doubled = (triangle[1] - triangle[0]).perp_dot(triangle[2] - triangle[0]);
     let sign = if doubled < 0.0 { -1.0 } else { 1.0 };
-    let (first_row, last_row) = open_range(low.y - 1.0, high.y + 1.0);
+    let (first_row, last_row) = open_range(low.y - reach, high.y + reach);
     for row in first_row..=last_row {
-        let Some((left, right)) = span(triangle, f64::from(row) - 1.0, f64::from(row) + 1.0) else {
+        let Some((left, right)) = span(triangle, f64::from(row) - reach, f64::from(row) + reach) else {
             continue;
         };
-        let (first, last) = open_range(left - 1.0, right + 1.0);
+        let (first, last) = open_range(left - reach, right + reach);
         for column in first..=last {
             let centre = DVec2::new(f64::from(column), f64::from(row));
             let closest = if doubled != 0.0 && contains(triangle, sign, centre) {

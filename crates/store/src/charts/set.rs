@@ -352,7 +352,7 @@ impl ChartSet {
             let flat = corners.map(|uv| {
                 glam::DVec2::new(f64::from(uv.x), f64::from(uv.y)) / f64::from(TEXEL_FRACTION) - 0.5
             });
-            touched(flat, |x, y, closest| {
+            touched(flat, 1.0, |x, y, closest| {
                 let distance = closest.distance_squared(glam::DVec2::new(f64::from(x), f64::from(y)));
                 let slot = &mut nearest[first + y as usize * width + x as usize];
                 if distance < slot.0 {

@@ -58,6 +58,10 @@ impl Pages {
         self.texels.len()
     }
 
+    pub(super) fn all_texels(&self) -> &[[u8; 2]] {
+        &self.texels
+    }
+
     pub(super) fn texels(&self, layer: u32) -> &[[u8; 2]] {
         let area = self.side as usize * self.side as usize;
         &self.texels[layer as usize * area..][..area]

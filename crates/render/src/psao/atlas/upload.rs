@@ -42,6 +42,16 @@ impl VisibilityAtlas {
         self.pages.texels(layer)
     }
 
+    /// Texels `[old, new]` of all layers, one after the other, rows from the top.
+    pub fn all_texels(&self) -> &[[u8; 2]] {
+        self.pages.all_texels()
+    }
+
+    /// How many instances are ready.
+    pub fn ready_count(&self) -> usize {
+        self.sets.iter().filter(|state| matches!(state, SetState::Ready(_))).count()
+    }
+
     /// Texels of all layers.
     pub fn texel_count(&self) -> usize {
         self.pages.texel_count()

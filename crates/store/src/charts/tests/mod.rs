@@ -1,8 +1,8 @@
 //! Tests of charts.
 
+mod atlas;
 mod invariants;
 mod property;
 mod scenes;
 mod shapes;
-mod timing;
 mod truth;

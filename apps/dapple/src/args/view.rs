@@ -1,0 +1,152 @@
+//! Arguments of `dapple view`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use dapple_client::viewer::{DebugView, Method};
+
+use super::{SceneChoice, Size, VisibilityArgs};
+
+pub(crate) const VIEW_EXAMPLES: &str = "\
+Examples:
+  dapple view room.glb                           lights the room while you walk through it
+  dapple view --builtin atrium --detail 0.5 --points 256 --hz 5
+  dapple view room.glb --stream room.dapple      plays a recording (dapple record)
+  dapple view --url http://127.0.0.1:8000/       what a page there shows (dapple demo)
+  dapple view --builtin atrium --headless --frames 8 --view texels --size 640x360 -o out/texels
+
+In the window H or F1 lists the keys.";
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ViewArgs {
+    #[command(flatten)]
+    pub(crate) scene: SceneChoice,
+    /// Folder of a page (its viewer.json, scene and recording), over plain HTTP.
+    #[arg(long, value_name = "URL", conflicts_with_all = ["scene", "builtin", "detail", "stream"])]
+    pub(crate) url: Option<String>,
+    /// Recording to play; without it the scene is lit while it is shown.
+    #[arg(long, value_name = "FILE.dapple", conflicts_with_all = ["points", "hz"])]
+    pub(crate) stream: Option<PathBuf>,
+    /// Points spawned a square metre; half are kept [default: the preset's].
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub(crate) points: Option<f32>,
+    /// Server updates a second [default: 15].
+    #[arg(long, value_name = "H", allow_hyphen_values = true)]
+    pub(crate) hz: Option<f64>,
+    #[command(flatten)]
+    pub(crate) visibility: VisibilityArgs,
+    /// Effort: points, samples a pixel, shadow maps.
+    #[arg(long, value_enum, default_value = "desktop")]
+    pub(crate) preset: Preset,
+    /// Samples a pixel, 1 or 4 [default: the preset's].
+    #[arg(long, value_name = "N")]
+    pub(crate) samples: Option<u32>,
+    /// How visibility is found.
+    #[arg(long, value_enum, default_value = "psao")]
+    pub(crate) method: ViewMethod,
+    /// What is drawn.
+    #[arg(long, value_enum, default_value = "beauty")]
+    pub(crate) view: ViewKind,
+    /// Right of this part of the width (0 to 1) the other method is shown.
+    #[arg(long, value_name = "PART")]
+    pub(crate) split: Option<f32>,
+    /// The other method of a split picture.
+    #[arg(long, value_enum, default_value = "none")]
+    pub(crate) other: ViewMethod,
+    /// Seconds that an update fades in over; 0 for none [default: 1/15; 0 with --headless].
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub(crate) fade: Option<f32>,
+    /// A camera of the scene by name, or one given as eye=X,Y,Z,target=X,Y,Z,fov=DEGREES (vertical)
+    /// [default: the scene's first camera path].
+    #[arg(long, value_name = "CAMERA")]
+    pub(crate) camera: Option<String>,
+    /// Animation time to begin at, seconds.
+    #[arg(long, value_name = "T", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub(crate) time: f64,
+    /// Begin with time standing still.
+    #[arg(long)]
+    pub(crate) paused: bool,
+    /// Size of window or pictures in pixels.
+    #[arg(long, value_name = "WxH", default_value = "1280x720")]
+    pub(crate) size: Size,
+    /// Write pictures instead of opening a window.
+    #[arg(long)]
+    pub(crate) headless: bool,
+    /// Pictures to write, evenly spread over the seconds from --time on.
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "headless")]
+    pub(crate) frames: u32,
+    /// Seconds that the pictures are spread over [default: the rest of the animation].
+    #[arg(long, value_name = "S", requires = "headless")]
+    pub(crate) seconds: Option<f64>,
+    /// Folder for pictures and screenshots [default: out/view; the current folder for screenshots].
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// How much effort a device can make.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Preset {
+    /// 256 points a square metre, 1 sample, small shadow maps.
+    Phone,
+    /// 512 points a square metre, 4 samples, small shadow maps.
+    Headset,
+    /// 512 points a square metre, 4 samples, large shadow maps.
+    Desktop,
+}
+
+/// A viewer's [`Method`] by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ViewMethod {
+    /// Points, through the visibility atlas.
+    Psao,
+    /// Points, by the paper's look-up.
+    PsaoPaper,
+    /// No occlusion.
+    None,
+}
+
+impl From<ViewMethod> for Method {
+    fn from(method: ViewMethod) -> Method {
+        match method {
+            ViewMethod::Psao => Method::Psao,
+            ViewMethod::PsaoPaper => Method::PsaoPaper,
+            ViewMethod::None => Method::None,
+        }
+    }
+}
+
+/// A viewer's [`DebugView`] by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ViewKind {
+    /// The lit scene.
+    Beauty,
+    /// Visibility alone, white is open.
+    Visibility,
+    /// World normals as colours.
+    Normal,
+    /// The points in the shade of their visibility.
+    Points,
+    /// The texels of the atlas, charts in different colours.
+    Texels,
+    /// How many points a texel depends on.
+    Weights,
+    /// Time since visibility last changed.
+    Age,
+    /// Difference of --method and --other.
+    Error,
+}
+
+impl From<ViewKind> for DebugView {
+    fn from(kind: ViewKind) -> DebugView {
+        match kind {
+            ViewKind::Beauty => DebugView::Beauty,
+            ViewKind::Visibility => DebugView::Visibility,
+            ViewKind::Normal => DebugView::Normal,
+            ViewKind::Points => DebugView::Points,
+            ViewKind::Texels => DebugView::Texels,
+            ViewKind::Weights => DebugView::Weights,
+            ViewKind::Age => DebugView::Age,
+            ViewKind::Error => DebugView::Error,
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! Arguments of the verbs around streams: record, inspect, demo.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::{SceneChoice, VisibilityArgs};
+
+pub(crate) const RECORD_EXAMPLES: &str = "\
+Examples:
+  dapple record room.glb -o room.dapple
+  dapple record --builtin atrium --seconds 10 --hz 15 --points 512 -o atrium.dapple
+  dapple record city.glb --radius auto --snapshot-every 2 -o city.dapple
+
+The scene itself is not in the file: who plays it loads the same scene (a built-in one with the same detail).
+docs/recording.md specifies the file.";
+
+pub(crate) const INSPECT_EXAMPLES: &str = "\
+Examples:
+  dapple inspect room.dapple
+  dapple inspect room.dapple --scene room.glb            does the light belong to this scene?
+  dapple inspect atrium.dapple --builtin atrium";
+
+pub(crate) const DEMO_EXAMPLES: &str = "\
+Examples:
+  dapple demo                                    the built-in atrium; make demo builds the page first
+  dapple demo --port 9000 --page target/web
+  dapple demo --detail 0.5 --points 512 --out out/large --fresh
+
+With the environment variable CI set it fetches its own page once and ends.";
+
+/// How points are laid and updated.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct LightArgs {
+    /// Points spawned a square metre; half are kept.
+    #[arg(long, value_name = "N", default_value_t = 512.0, allow_hyphen_values = true)]
+    pub(crate) points: f32,
+    /// Server updates a second.
+    #[arg(long, value_name = "H", default_value_t = 15.0, allow_hyphen_values = true)]
+    pub(crate) hz: f64,
+    #[command(flatten)]
+    pub(crate) visibility: VisibilityArgs,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RecordArgs {
+    #[command(flatten)]
+    pub(crate) scene: SceneChoice,
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
+    /// Seconds that are recorded, from the start of the animation [default: all of it; 10 of a still scene].
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    pub(crate) seconds: Option<f64>,
+    /// Seconds after which a snapshot is recorded again, where a player can begin.
+    #[arg(long, value_name = "S", default_value_t = 5.0, allow_hyphen_values = true)]
+    pub(crate) snapshot_every: f64,
+    /// What it shows, for people [default: the scene's name].
+    #[arg(long, value_name = "TEXT")]
+    pub(crate) name: Option<String>,
+    /// The file to write [default: the scene's name with .dapple].
+    #[arg(short, long, value_name = "FILE.dapple")]
+    pub(crate) output: Option<PathBuf>,
+    /// Threads; 0 is one for each core.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) threads: usize,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct InspectArgs {
+    /// The file.
+    #[arg(value_name = "FILE.dapple")]
+    pub(crate) file: PathBuf,
+    /// Compare with the scene in this file.
+    #[arg(long, value_name = "SCENE", conflicts_with = "builtin")]
+    pub(crate) scene: Option<PathBuf>,
+    /// Compare with this built-in scene.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) builtin: Option<String>,
+    /// Tessellation of the built-in scene, above 0 to 1.
+    #[arg(long, value_name = "D")]
+    pub(crate) detail: Option<f32>,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct DemoArgs {
+    /// The built-in scene that is shown.
+    #[arg(long, value_name = "NAME", default_value = "atrium")]
+    pub(crate) builtin: String,
+    /// Its tessellation, above 0 to 1.
+    #[arg(long, value_name = "D", default_value_t = 0.25)]
+    pub(crate) detail: f32,
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
+    /// Seconds that are recorded and played round and round [default: the whole animation].
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    pub(crate) seconds: Option<f64>,
+    /// Folder of the built page [default: target/web].
+    #[arg(long, value_name = "DIR")]
+    pub(crate) page: Option<PathBuf>,
+    /// Folder that is filled and served.
+    #[arg(long, value_name = "DIR", default_value = "out/demo-page")]
+    pub(crate) out: PathBuf,
+    /// Make scene and light again, whether they are up to date or not.
+    #[arg(long)]
+    pub(crate) fresh: bool,
+    /// Address to listen on; 0.0.0.0 lets others in the network in.
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
+    pub(crate) host: String,
+    /// Port to listen on; 0 takes any [default: 8000, or the next that is free].
+    #[arg(long, value_name = "PORT")]
+    pub(crate) port: Option<u16>,
+}

@@ -1,0 +1,119 @@
+//! The server's settings from the command line, and the recording of what it sends.
+
+use anyhow::{Context, Result, bail};
+use dapple_scene::Scene;
+use dapple_server::{Progress, Server, ServerConfig};
+use dapple_stream::{PublisherConfig, Recorder, RecordingHeader};
+use dapple_trace::psao::generate::GenerateParams;
+use dapple_trace::psao::update::UpdateParams;
+
+use crate::args::LightArgs;
+use crate::progress::Bar;
+use crate::source::{self, Loaded};
+
+/// Longest recording, seconds.
+const MAX_SECONDS: f64 = 86_400.0;
+
+/// Seconds shown of a scene without animation.
+const STILL_SECONDS: f64 = 10.0;
+
+/// What a server is to do.
+pub(crate) fn server_config(scene: &Scene, args: &LightArgs) -> Result<ServerConfig> {
+    let LightArgs { points, hz, visibility } = args;
+    if !(points.is_finite() && *points > 0.0) {
+        bail!("--points is {points}, must be above 0");
+    }
+    if !(hz.is_finite() && *hz > 0.0 && *hz <= 1000.0) {
+        bail!("--hz is {hz}, must be above 0 to 1000");
+    }
+    let (radius_m, density_factor) = source::resolve_radius(scene, visibility)?;
+    Ok(ServerConfig {
+        generate: GenerateParams {
+            points_per_m2: points * density_factor,
+            seed: visibility.seed,
+            ..GenerateParams::default()
+        },
+        update: UpdateParams { rays: visibility.point_rays, radius_m, threshold: visibility.threshold },
+        ..ServerConfig::default()
+    })
+}
+
+/// Seconds after which the scene repeats: those of its animation, or ten of a still scene.
+pub(crate) fn scene_seconds(scene: &Scene) -> f64 {
+    let animation = scene.active_animation.and_then(|i| scene.animations.get(i as usize));
+    let seconds = animation.map_or(0.0, |animation| f64::from(animation.duration()));
+    if seconds > 0.0 { seconds } else { STILL_SECONDS }
+}
+
+/// Seconds of scene time in the units of recordings.
+pub(crate) fn microseconds(seconds: f64) -> u64 {
+    (seconds * 1e6).round() as u64 // saturates
+}
+
+/// What is to be recorded.
+pub(crate) struct Take<'a> {
+    pub(crate) loaded: &'a Loaded,
+    pub(crate) light: &'a LightArgs,
+    pub(crate) seconds: Option<f64>,
+    pub(crate) snapshot_every_s: f64,
+    pub(crate) name: String,
+}
+
+/// A finished recording and its figures.
+pub(crate) struct Taken {
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) seconds: f64,
+    pub(crate) points: usize,
+    pub(crate) updates: usize,
+    pub(crate) frame_bytes: u64,
+}
+
+/// Lights the scene along its animation and records what subscribers would receive.
+pub(crate) fn record(take: &Take<'_>) -> Result<Taken> {
+    let scene = &take.loaded.scene;
+    let seconds = take.seconds.unwrap_or_else(|| scene_seconds(scene));
+    if !(seconds > 0.0 && seconds <= MAX_SECONDS) {
+        bail!("--seconds is {seconds}, must be above 0 to {MAX_SECONDS}");
+    }
+    if !(take.snapshot_every_s > 0.0 && take.snapshot_every_s.is_finite()) {
+        bail!("--snapshot-every is {}, must be above 0", take.snapshot_every_s);
+    }
+    let hz = take.light.hz;
+    let mut config = server_config(scene, take.light)?;
+    // A group of D deltas is closed by a snapshot, so D + 1 updates lie between snapshots.
+    let deltas = (take.snapshot_every_s * hz).ceil() - 1.0;
+    config.publish = PublisherConfig { deltas_per_group: deltas.max(1.0) as u32, ..config.publish };
+    let header = RecordingHeader {
+        scene_hash: scene.hash().0,
+        name: take.name.clone(),
+        duration_us: microseconds(seconds),
+    };
+    let (mut recorder, mut bytes) = Recorder::new(&header).context("--name")?;
+
+    let ticks = (seconds * hz + 1e-9).floor() as u64;
+    let bar = Bar::new("points", 1000);
+    let mut server = Server::new(scene.clone(), &config, &|progress| match progress {
+        Progress::Laying(done, of) => bar.set((done * 400 / of.max(1)) as u64),
+        Progress::Tracing(done, of) => bar.set((400 + done * 500 / of.max(1)) as u64),
+        Progress::Cutting(done, of) => bar.set((900 + done * 100 / of.max(1)) as u64),
+    })?;
+    drop(bar);
+    let mut frame_bytes = 0;
+    let mut updates = 0;
+    if let Some(frame) = server.join()? {
+        frame_bytes += frame.bytes.len() as u64;
+        bytes.extend(recorder.frame(0, &frame.bytes)?);
+    }
+    let bar = Bar::new("recording", ticks);
+    for tick in 1..=ticks {
+        let time_s = tick as f64 / hz;
+        if let Some(frame) = server.step(time_s)?.frame {
+            frame_bytes += frame.bytes.len() as u64;
+            updates += 1;
+            bytes.extend(recorder.frame(microseconds(time_s).min(header.duration_us), &frame.bytes)?);
+        }
+        bar.set(tick);
+    }
+    bytes.extend(recorder.finish());
+    Ok(Taken { bytes, seconds, points: server.store().layout().len(), updates, frame_bytes })
+}

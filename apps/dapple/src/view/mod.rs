@@ -1,0 +1,100 @@
+//! `dapple view`: a scene and its light in a window, or as pictures without one.
+
+mod feed;
+mod fetch;
+mod headless;
+mod live;
+mod overlay;
+mod paint;
+mod picture;
+mod quality;
+mod screen;
+mod session;
+mod show;
+mod steer;
+mod window;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::{Result, bail};
+use dapple_client::viewer::DrawOptions;
+
+use crate::args::{LightArgs, ViewArgs};
+use crate::source;
+
+use feed::{Feed, Player};
+use quality::Quality;
+use show::{Opening, start_server};
+use steer::Steering;
+
+/// Updates a second where none are given.
+const DEFAULT_HZ: f64 = 15.0;
+
+/// Shows what the arguments name.
+pub(crate) fn run(args: &ViewArgs) -> Result<()> {
+    check(args)?;
+    let opening = open(args)?;
+    if args.headless {
+        return headless::run(args, opening);
+    }
+    let screenshots = args.out.clone().unwrap_or_else(|| PathBuf::from("."));
+    window::run(opening, args.size, screenshots, args.paused, args.time)
+}
+
+fn check(args: &ViewArgs) -> Result<()> {
+    if !(args.time.is_finite() && args.time >= 0.0) {
+        bail!("--time is {}, must be 0 or more seconds", args.time);
+    }
+    if args.samples.is_some_and(|samples| samples != 1 && samples != 4) {
+        bail!("--samples must be 1 or 4");
+    }
+    if args.split.is_some_and(|part| !(0.0..=1.0).contains(&part)) {
+        bail!("--split must be 0 to 1, a part of the width");
+    }
+    if args.fade.is_some_and(|seconds| !(0.0..=10.0).contains(&seconds)) {
+        bail!("--fade must be 0 to 10 seconds");
+    }
+    Ok(())
+}
+
+/// Scene, light and camera of the arguments.
+fn open(args: &ViewArgs) -> Result<Opening> {
+    let quality = Quality::from_args(args);
+    let light = LightArgs {
+        points: quality.points_per_m2,
+        hz: args.hz.unwrap_or(DEFAULT_HZ),
+        visibility: args.visibility.clone(),
+    };
+    let (scene, title, feed) = match &args.url {
+        Some(url) => {
+            let fetched = fetch::fetch(url)?;
+            let scene = Arc::new(fetched.scene);
+            let feed = match fetched.stream {
+                Some(pieces) => Feed::Recorded(Player::incoming(pieces, &scene)),
+                None => Feed::None,
+            };
+            (scene, fetched.title, feed)
+        }
+        None => {
+            let loaded = source::load(&args.scene, None)?;
+            let feed = match &args.stream {
+                Some(file) => Feed::Recorded(Player::open(file, &loaded.scene)?),
+                None => start_server(&loaded.scene, &light, 0)?,
+            };
+            (loaded.scene, loaded.title, feed)
+        }
+    };
+    let steering = Steering::new(&scene, args.camera.as_deref(), args.time)?;
+    let usual = DrawOptions::default();
+    let fade_s = args.fade.unwrap_or(if args.headless { 0.0 } else { usual.fade_s });
+    // The error is that between two methods, side by side or not.
+    let other = args.other.into();
+    let split = match args.split {
+        Some(part) => Some((part, other)),
+        None if args.view == crate::args::ViewKind::Error => Some((0.0, other)),
+        None => None,
+    };
+    let options = DrawOptions { view: args.view.into(), method: args.method.into(), split, fade_s, ..usual };
+    Ok(Opening { scene, title, feed, steering, options, quality, light })
+}

@@ -1,0 +1,350 @@
+// The handle for pages: createViewer(canvas, options) shows a scene and its light in a canvas.
+//
+// dapple.d.ts documents every option and method. This file owns requests, the clock and events; the compiled program
+// beside it (dapple_web_bg.wasm) owns the canvas.
+
+import init, { Core } from "./dapple_web.js";
+import { fetchBytes, fetchChunks } from "./fetch.js";
+import { attachControls } from "./input.js";
+
+// The program is fetched once, however many viewers a page has.
+let program;
+
+/** Shows `options.scene`, lit by `options.stream`, in `canvas`. Rejects with a readable Error where that cannot be. */
+export async function createViewer(canvas, options = {}) {
+  const progress = (stage, loaded, total) => options.onProgress?.({ stage, loaded, total });
+  const viewer = new Viewer(canvas, options, progress);
+  try {
+    await viewer._open();
+    return viewer;
+  } catch (error) {
+    viewer.dispose();
+    throw error;
+  }
+}
+
+class Viewer {
+  #canvas;
+  #options;
+  #progress;
+  #core = null;
+  #abort = new AbortController();
+  #texels = 4096;
+  #lastFrame = 0;
+  #lastStats = 0;
+  #ready = Promise.withResolvers?.() ?? withResolvers();
+  #streamed = false;
+  #detach = [];
+  #settled = 0;
+  #working = false;
+
+  constructor(canvas, options, progress) {
+    this.#canvas = canvas;
+    this.#options = options;
+    this.#progress = progress;
+    // Whoever does not wait for it still learns of errors by onError.
+    this.#ready.promise.catch(() => {});
+  }
+
+  async _open() {
+    const { scene, stream, backend = "auto" } = this.#options;
+    if (!scene) throw new Error("No scene was named: give options.scene the address of a .glb file.");
+    program ??= fetchBytes(new URL("./dapple_web_bg.wasm", import.meta.url), null, (loaded, total) =>
+      this.#progress("program", loaded, total),
+    ).then((bytes) => init({ module_or_path: bytes }));
+    try {
+      await program;
+    } catch (error) {
+      program = undefined;
+      throw error;
+    }
+    this.#fitCanvas();
+    try {
+      this.#core = await Core.open(this.#canvas, backend);
+    } catch (error) {
+      throw new NoGraphicsError(error.message ?? String(error));
+    }
+    const url = new URL(scene, document.baseURI);
+    const bytes = await fetchBytes(url, this.#abort.signal, (loaded, total) => this.#progress("scene", loaded, total));
+    this.#living();
+    const name = decodeURIComponent(url.pathname.split("/").pop() || "scene.glb");
+    const { shadowResolution = 0, samples = 0 } = this.#options;
+    try {
+      this.#core.loadScene(name, bytes, shadowResolution, samples);
+    } catch (error) {
+      throw new Error(`The scene ${url.href} cannot be shown: ${error.message ?? error}`);
+    }
+    this.#apply();
+    this.#listen();
+    requestAnimationFrame(this.#frame);
+    if (stream) this.#fetchStream(new URL(stream, document.baseURI)).catch((error) => this.#fail(error));
+    else this.#streamed = true;
+  }
+
+  #apply() {
+    const { method, view, split, camera, time, loop = true, paused = false, fade } = this.#options;
+    if (method) this.setMethod(method);
+    if (view) this.setView(view);
+    if (split) this.setSplit(split.position, split.method);
+    if (camera) this.setCamera(camera);
+    if (fade !== undefined) this.#core.setFade(fade);
+    this.#core.setLooping(loop);
+    this.#core.setPlaying(!paused);
+    if (time) this.seek(time);
+  }
+
+  async #fetchStream(url) {
+    const { time = 0 } = this.#options;
+    let sought = !time;
+    await fetchChunks(
+      url,
+      this.#abort.signal,
+      (chunk) => {
+        if (!this.#core) return;
+        try {
+          this.#core.pushStream(chunk);
+        } catch (error) {
+          throw new Error(`The stream ${url.href} cannot be played: ${error.message ?? error}`);
+        }
+        if (!sought) {
+          // As far as it has come.
+          this.seek(time);
+          sought = this.time >= time;
+        }
+      },
+      (loaded, total) => this.#progress("stream", loaded, total),
+    );
+    this.#living();
+    try {
+      this.#core.finishStream();
+    } catch (error) {
+      throw new Error(`The stream ${url.href} cannot be played: ${error.message ?? error}`);
+    }
+    this.#streamed = true;
+  }
+
+  #listen() {
+    const { controls = true, autoResize = true } = this.#options;
+    if (controls) this.#detach.push(attachControls(this.#canvas, this.#core, () => this.#core !== null));
+    if (autoResize && globalThis.ResizeObserver) {
+      const observer = new ResizeObserver(() => this.#fitCanvas());
+      observer.observe(this.#canvas);
+      this.#detach.push(() => observer.disconnect());
+    }
+    const lost = (event) => {
+      event.preventDefault();
+      this.#fail(new Error("The graphics card was lost (webglcontextlost). Reload the page to go on."));
+    };
+    this.#canvas.addEventListener("webglcontextlost", lost);
+    this.#detach.push(() => this.#canvas.removeEventListener("webglcontextlost", lost));
+  }
+
+  #frame = (now) => {
+    if (!this.#core) return;
+    requestAnimationFrame(this.#frame);
+    const interval = Math.min(Math.max(now - this.#lastFrame, 4), 100);
+    this.#lastFrame = now;
+    const working = this.#work(Math.max(10, 0.5 * interval));
+    this.#draw();
+    if (!this.#core) return;
+    // What was fetched last is taken by the first of these, causes work from the second on, and shows in the third.
+    this.#settled = this.#streamed && !working ? this.#settled + 1 : 0;
+    if (this.#settled === 3) this.#ready.resolve();
+    if (this.#options.onStats && now - this.#lastStats > (this.#options.statsInterval ?? 500)) {
+      this.#lastStats = now;
+      this.#options.onStats(this.stats);
+    }
+  };
+
+  // Draws what has changed; true if anything had to be drawn.
+  #draw() {
+    try {
+      return this.#core?.frame(performance.now() / 1000) ?? false;
+    } catch (error) {
+      this.#fail(error instanceof Error ? error : new Error(String(error)));
+      return false;
+    }
+  }
+
+  // Goes on with what a snapshot causes for about so many milliseconds; true while there is more.
+  #work(budget) {
+    const start = performance.now();
+    for (;;) {
+      const before = performance.now();
+      let done, total;
+      try {
+        ({ done, total } = this.#core.work(this.#texels));
+      } catch (error) {
+        this.#fail(error instanceof Error ? error : new Error(String(error)));
+        return false;
+      }
+      const after = performance.now();
+      if (done >= total) {
+        if (this.#working) this.#progress("light", total, total);
+        this.#working = false;
+        return false;
+      }
+      this.#working = true;
+      // Pieces of about 2 ms.
+      if (after - before < 1) this.#texels = Math.min(this.#texels * 2, 1 << 20);
+      else if (after - before > 4) this.#texels = Math.max(this.#texels >> 1, 64);
+      if (after - start > budget) {
+        this.#progress("light", done, total);
+        return true;
+      }
+    }
+  }
+
+  #fail(error) {
+    if (this.#abort.signal.aborted) return;
+    this.#ready.reject(error);
+    this.dispose();
+    if (this.#options.onError) this.#options.onError(error);
+    else console.error(error);
+  }
+
+  #living() {
+    if (!this.#core) throw new Error("The viewer was disposed of.");
+    return this.#core;
+  }
+
+  #fitCanvas() {
+    if (this.#options.autoResize === false) return;
+    const { maxPixelRatio = 2 } = this.#options;
+    const ratio = Math.min(globalThis.devicePixelRatio || 1, maxPixelRatio);
+    const { clientWidth, clientHeight } = this.#canvas;
+    if (clientWidth > 0 && clientHeight > 0) this.resize(Math.round(clientWidth * ratio), Math.round(clientHeight * ratio));
+  }
+
+  get ready() {
+    return this.#ready.promise;
+  }
+
+  get paused() {
+    return !this.stats.playing;
+  }
+
+  get time() {
+    return this.stats.time;
+  }
+
+  get duration() {
+    return this.stats.duration;
+  }
+
+  get stats() {
+    return this.#living().stats(performance.now() / 1000);
+  }
+
+  get warnings() {
+    return this.#living().warnings();
+  }
+
+  get cameras() {
+    return this.#living().cameraPaths();
+  }
+
+  play() {
+    this.#living().setPlaying(true);
+  }
+
+  pause() {
+    this.#living().setPlaying(false);
+  }
+
+  seek(time) {
+    this.#living().seek(time);
+  }
+
+  setLoop(loop) {
+    this.#living().setLooping(loop);
+  }
+
+  setMethod(method) {
+    this.#living().setMethod(method);
+  }
+
+  setView(view) {
+    this.#living().setView(view);
+  }
+
+  setSplit(position, method = "none") {
+    if (position === null || position === undefined) this.#living().clearSplit();
+    else this.#living().setSplit(position, method);
+  }
+
+  getCamera() {
+    return this.#living().camera();
+  }
+
+  setCamera(camera) {
+    const core = this.#living();
+    if (camera === "fit") core.fit();
+    else if (typeof camera === "string") core.followPath(camera);
+    else core.lookAt(Float32Array.from(camera.eye), Float32Array.from(camera.target), camera.yfovDegrees ?? 50);
+  }
+
+  setWalking(walking) {
+    this.#living().setWalking(walking);
+  }
+
+  rotate(dx, dy) {
+    this.#living().rotate(dx, dy);
+  }
+
+  pan(dx, dy) {
+    this.#living().pan(dx, dy);
+  }
+
+  zoom(factor) {
+    this.#living().zoom(factor);
+  }
+
+  async screenshot(type = "image/png") {
+    this.#living().invalidate();
+    // A canvas holds its picture only until the browser has shown it.
+    if (!this.#draw()) throw new Error("The browser does not let the page draw now.");
+    const blob = await new Promise((resolve) => this.#canvas.toBlob(resolve, type));
+    if (!blob) throw new Error("The browser cannot write this picture.");
+    return blob;
+  }
+
+  resize(width, height) {
+    if (this.#canvas.width !== width || this.#canvas.height !== height) {
+      this.#canvas.width = width;
+      this.#canvas.height = height;
+    }
+    this.#core?.resize(width, height);
+    // A canvas that was resized is empty until it is drawn to.
+    this.#draw();
+  }
+
+  dispose() {
+    this.#abort.abort();
+    for (const detach of this.#detach.splice(0)) detach();
+    const core = this.#core;
+    this.#core = null;
+    try {
+      core?.free();
+    } catch {
+      // A program that has failed cannot tidy up after itself.
+    }
+  }
+}
+
+/** Neither WebGPU nor WebGL2 is to be had. */
+export class NoGraphicsError extends Error {
+  constructor(reason) {
+    super(
+      "This browser shows no 3D graphics: neither WebGPU nor WebGL2 works here. A current browser on a machine with " +
+        `graphics drivers has at least one of them; it may be switched off in the browser's settings. (${reason})`,
+    );
+    this.name = "NoGraphicsError";
+  }
+}
+
+function withResolvers() {
+  const result = {};
+  result.promise = new Promise((resolve, reject) => Object.assign(result, { resolve, reject }));
+  return result;
+}

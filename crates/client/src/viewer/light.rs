@@ -1,0 +1,114 @@
+//! The light that a viewer holds: store, atlas, and what of it lies on the card.
+
+use std::sync::Arc;
+
+use dapple_gpu::Gpu;
+use dapple_render::forward::{AtlasBand, ForwardError, GpuScene};
+use dapple_render::psao::atlas::{AtlasParams, PointChange, VisibilityAtlas};
+use dapple_scene::Scene;
+use dapple_stream::{Applied, ReceiveError, Subscriber, ValueChange};
+
+use super::inspect::Inspection;
+
+/// What comes off the wire, resolved into texels.
+pub(super) struct Light {
+    scene: Arc<Scene>,
+    pub(super) subscriber: Subscriber,
+    pub(super) atlas: Option<VisibilityAtlas>,
+    pub(super) inspection: Inspection,
+    /// Whether what lies on the card is of another atlas.
+    is_new: bool,
+    /// When the running fade began, seconds; long ago if none runs.
+    fade_start_s: f64,
+}
+
+impl Light {
+    pub(super) fn new(scene: Arc<Scene>, subscriber: Subscriber) -> Light {
+        let inspection = Inspection::default();
+        Light { scene, subscriber, atlas: None, inspection, is_new: false, fade_start_s: f64::NEG_INFINITY }
+    }
+
+    pub(super) fn receive(&mut self, bytes: &[u8], now_s: f64) -> Result<Applied, ReceiveError> {
+        let applied = self.subscriber.receive(bytes)?;
+        match &applied {
+            Applied::NewLayout => {
+                self.is_new = true;
+                self.inspection.reset();
+                let cuts = self.subscriber.cuts();
+                self.atlas = self.subscriber.store().map(|store| {
+                    VisibilityAtlas::new(store.layout().clone(), &self.scene, cuts, AtlasParams::default())
+                });
+            }
+            Applied::Changes(changes) => self.apply(changes, now_s),
+            Applied::Ignored(_) => {}
+        }
+        Ok(applied)
+    }
+
+    fn apply(&mut self, changes: &[ValueChange], now_s: f64) {
+        let Some(atlas) = &mut self.atlas else { return };
+        atlas.begin_update();
+        atlas.apply(changes.iter().map(|c| PointChange { point: c.point, old: c.old, new: c.new }));
+        self.fade_start_s = now_s;
+    }
+
+    /// Makes charts and weights, about `texels` of work; what becomes ready fades in from `now_s` on.
+    pub(super) fn work(&mut self, texels: usize, now_s: f64, fade_s: f32) -> (u64, u64) {
+        let (Some(atlas), Some(store)) = (&mut self.atlas, self.subscriber.store()) else { return (0, 0) };
+        if atlas.progress().is_complete() {
+            let progress = atlas.progress();
+            return (progress.done, progress.total);
+        }
+        // Once a fade is over, another may begin without that what is shown jumps.
+        let is_over = self.fade_start_s + f64::from(fade_s) <= now_s;
+        if is_over {
+            atlas.begin_update();
+        }
+        let before = atlas.ready_count();
+        let progress = atlas.work(&self.scene, store.visibility(), texels);
+        if is_over && atlas.ready_count() > before {
+            self.fade_start_s = now_s;
+        }
+        (progress.done, progress.total)
+    }
+
+    /// How far the fade is at `now_s`, 0 … 1.
+    pub(super) fn fade(&self, now_s: f64, fade_s: f32) -> f32 {
+        if fade_s > 0.0 {
+            ((now_s - self.fade_start_s) / f64::from(fade_s)).clamp(0.0, 1.0) as f32
+        } else {
+            1.0
+        }
+    }
+
+    /// Brings onto the card what changed since the last call.
+    pub(super) fn upload(
+        &mut self,
+        gpu: &Gpu,
+        gpu_scene: &mut GpuScene,
+        now_s: f64,
+    ) -> Result<(), ForwardError> {
+        let Some(atlas) = &mut self.atlas else { return Ok(()) };
+        if std::mem::take(&mut self.is_new) {
+            for instance in 0..self.scene.instances.len() as u32 {
+                gpu_scene.set_pages(gpu, instance, &[])?;
+            }
+        }
+        for instance in atlas.take_ready() {
+            let Some(charts) = atlas.charts(instance) else { continue };
+            gpu_scene.set_charts(gpu, instance, charts)?;
+            gpu_scene.set_pages(gpu, instance, atlas.placements(instance))?;
+        }
+        let dirty = atlas.take_dirty();
+        let bands: Vec<AtlasBand> = dirty
+            .into_iter()
+            .map(|band| AtlasBand { layer: band.layer, first_row: band.y.start, end_row: band.y.end })
+            .collect();
+        if !bands.is_empty() {
+            let layers: Vec<&[[u8; 2]]> = (0..atlas.layers()).map(|layer| atlas.texels(layer)).collect();
+            gpu_scene.upload_atlas(gpu, atlas.side(), &layers, &bands)?;
+            self.inspection.note(atlas, &bands, now_s);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,264 @@
+//! A viewer on a graphics card: frames and a camera in, a picture in a texture out. The same for a window, a browser
+//! tab and a run without either.
+//!
+//! ```text
+//! frames ─► subscriber ─► store ─► visibility atlas ─► dirty rows ─┐
+//! pose(time), camera ─► forward pass ──────────────────────────────┴─► picture
+//! ```
+
+mod anchors;
+mod inspect;
+mod light;
+mod options;
+mod paper;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use dapple_gpu::{Gpu, wgpu};
+use dapple_render::forward::{
+    Forward, FrameInputs, GpuPoints, GpuScene, GpuSceneOptions, LookupId, Rect, Transparency, View, ViewKind,
+};
+use dapple_scene::{Pose, PosedCamera, Scene};
+use dapple_store::points::PointStore;
+use dapple_stream::{Applied, ReceiveError, Subscriber};
+
+use anchors::Anchors;
+use light::Light;
+pub use options::{DebugView, DrawOptions, LoadProgress, Method, ViewerConfig, ViewerError, ViewerStats};
+use paper::PaperLookup;
+
+/// One viewer's copy of the light on a graphics card, and the passes that draw with it.
+pub struct Viewer {
+    scene: Arc<Scene>,
+    config: ViewerConfig,
+    light: Light,
+    gpu_scene: GpuScene,
+    forward: Forward,
+    transparency: Transparency,
+    paper: PaperLookup,
+    points: Option<PointsShown>,
+    stats: ViewerStats,
+    /// The caller's clock and the fade when it last drew.
+    now_s: f64,
+    fade_s: f32,
+}
+
+/// What the points view needs, made when it is first shown.
+struct PointsShown {
+    anchors: Anchors,
+    on_card: GpuPoints,
+    /// Scene time and frames received when they were last placed.
+    placed: Option<(f64, u64)>,
+}
+
+impl Viewer {
+    /// Uploads the scene. Frames of another scene are refused.
+    ///
+    /// # Errors
+    /// A scene that does not fit the device, or a number of samples other than 1 and 4.
+    pub fn new(gpu: &Gpu, scene: Arc<Scene>, config: ViewerConfig) -> Result<Viewer, ViewerError> {
+        let mut limits = config.limits;
+        limits.max_sets = limits.max_sets.max(u32::try_from(scene.instances.len()).unwrap_or(u32::MAX));
+        let subscriber = Subscriber::new(Some(scene.hash().0), limits);
+        let gpu_scene = GpuScene::new(gpu, scene.clone(), &GpuSceneOptions { mips: config.mips })?;
+        let forward = Forward::new(
+            gpu,
+            config.format.remove_srgb_suffix(),
+            config.samples,
+            &[PaperLookup::lookup(gpu)],
+        )?;
+        Ok(Viewer {
+            light: Light::new(scene.clone(), subscriber),
+            scene,
+            gpu_scene,
+            forward,
+            transparency: Transparency::Blend,
+            paper: PaperLookup::default(),
+            points: None,
+            stats: ViewerStats::default(),
+            now_s: 0.0,
+            fade_s: DrawOptions::default().fade_s,
+            config,
+        })
+    }
+
+    /// How materials with blended alpha are drawn; cutouts are what the processor's pictures have.
+    pub fn set_transparency(&mut self, transparency: Transparency) {
+        self.transparency = transparency;
+    }
+
+    /// Takes one frame off the wire, which came at `now_s` (seconds on the caller's clock, as in [`Viewer::draw`]).
+    /// On an error nothing has changed.
+    pub fn receive(&mut self, bytes: &[u8], now_s: f64) -> Result<Applied, ReceiveError> {
+        let applied = self.light.receive(bytes, now_s)?;
+        self.stats.bytes_received += bytes.len() as u64;
+        self.stats.frames_received += 1;
+        self.stats.last_frame_s = Some(now_s);
+        self.stats.points = self.store().map_or(0, |store| store.layout().len() as u32);
+        match &applied {
+            Applied::Changes(changes) => {
+                self.stats.changed = changes.len() as u32;
+                self.paper.apply(changes);
+            }
+            Applied::NewLayout => {
+                self.paper.forget();
+                self.stats.changed = self.stats.points;
+                self.points = None;
+            }
+            Applied::Ignored(_) => {}
+        }
+        Ok(applied)
+    }
+
+    /// Goes on with the work that a snapshot causes (charts, weights), about `texels` texels of it (some 100,000 a
+    /// second on one core); call it between frames until it is done. Until then surfaces that are not ready are
+    /// shown open; those that become ready fade in.
+    pub fn work(&mut self, texels: usize) -> LoadProgress {
+        let (done, total) = self.light.work(texels, self.now_s, self.fade_s);
+        LoadProgress { done, total }
+    }
+
+    /// Draws the scene as it is at `scene_time_s` (its animation's time) into `target`, `width` × `height` pixels
+    /// large. `now_s` is the caller's clock, which the fade runs on.
+    ///
+    /// # Errors
+    /// A camera or size that cannot be drawn, or a device that failed since the last picture.
+    #[allow(clippy::too_many_arguments, reason = "a picture has that many sides")]
+    pub fn draw(
+        &mut self,
+        gpu: &Gpu,
+        target: &wgpu::TextureView,
+        size: (u32, u32),
+        camera: &PosedCamera,
+        scene_time_s: f64,
+        now_s: f64,
+        options: &DrawOptions,
+    ) -> Result<(), ViewerError> {
+        (self.now_s, self.fade_s) = (now_s, options.fade_s);
+        self.light.upload(gpu, &mut self.gpu_scene, now_s)?;
+        let methods = [Some(options.method), options.split.map(|(_, method)| method)];
+        if methods.contains(&Some(Method::PsaoPaper)) {
+            self.paper.prepare(gpu, &mut self.forward, self.light.subscriber.store())?;
+        }
+        let wants_points = options.view == DebugView::Points;
+        // Only where points are shown must the processor know where deforming meshes are.
+        let pose = if wants_points {
+            self.scene.pose(scene_time_s)
+        } else {
+            self.scene.pose_undeformed(scene_time_s)
+        };
+        if wants_points {
+            self.place_points(gpu, &pose);
+        }
+        if let Some(atlas) = &self.light.atlas {
+            match options.view {
+                DebugView::Weights => self.light.inspection.show_weights(gpu, &mut self.gpu_scene, atlas)?,
+                DebugView::Age => self.light.inspection.show_ages(gpu, &mut self.gpu_scene, atlas, now_s)?,
+                _ => {}
+            }
+        }
+        let views = views(options, size, *camera, self.points.as_ref().map(|points| &points.on_card));
+        let inputs = FrameInputs {
+            pose: &pose,
+            shade: &self.config.shade,
+            tone_map: options.tone_map,
+            transparency: self.transparency,
+            fade: self.light.fade(now_s, options.fade_s),
+            views: &views,
+        };
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let drawn = self.forward.draw(gpu, &mut encoder, target, size, &mut self.gpu_scene, &inputs)?;
+        self.stats.ignored_lights = drawn.ignored_lights;
+        gpu.queue.submit([encoder.finish()]);
+        gpu.take_fault().map_or(Ok(()), |fault| Err(fault.into()))
+    }
+
+    fn place_points(&mut self, gpu: &Gpu, pose: &Pose) {
+        let Some(store) = self.light.subscriber.store() else { return };
+        let layout = store.layout();
+        let shown = self.points.get_or_insert_with(|| PointsShown {
+            anchors: Anchors::new(layout, &self.scene),
+            on_card: GpuPoints::new(gpu),
+            placed: None,
+        });
+        let now = Some((pose.time, self.stats.frames_received));
+        if shown.placed != now {
+            let positions = shown.anchors.positions_world(layout, &self.scene, pose);
+            let values = store.visibility().iter().map(|&v| f32::from(v) / 255.0);
+            shown.on_card.upload(gpu, positions.into_iter().zip(values));
+            shown.placed = now;
+        }
+    }
+
+    /// Figures for an overlay.
+    pub fn stats(&self) -> ViewerStats {
+        let store_bytes = self.stats.points as u64 * BYTES_A_STORED_POINT;
+        let (atlas_bytes, texels) =
+            self.light.atlas.as_ref().map_or((0, 0), |a| (a.memory_bytes(), a.texel_count() as u32));
+        ViewerStats {
+            texels,
+            memory_bytes: (store_bytes + atlas_bytes, self.gpu_scene.bytes()),
+            ..self.stats
+        }
+    }
+
+    /// What this viewer holds; nothing before the first snapshot.
+    pub fn store(&self) -> Option<&PointStore> {
+        self.light.subscriber.store()
+    }
+
+    /// The scene that it shows.
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.scene
+    }
+
+    /// The format of the views it draws to.
+    pub fn format(&self) -> wgpu::TextureFormat {
+        self.forward.format()
+    }
+}
+
+/// Three coordinates, a normal and a value.
+const BYTES_A_STORED_POINT: u64 = 15;
+
+fn lookup(method: Method) -> LookupId {
+    match method {
+        Method::None => LookupId::NONE,
+        Method::Psao => LookupId::ATLAS,
+        Method::PsaoPaper => paper::ID,
+    }
+}
+
+/// The whole picture, and what lies right of the split over it.
+fn views<'a>(
+    options: &DrawOptions,
+    size: (u32, u32),
+    camera: PosedCamera,
+    points: Option<&'a GpuPoints>,
+) -> Vec<View<'a>> {
+    let other = options.split.map_or(Method::None, |(_, method)| method);
+    let kind = match options.view {
+        DebugView::Beauty => ViewKind::Beauty,
+        DebugView::Visibility => ViewKind::Visibility,
+        DebugView::Normal => ViewKind::Normal,
+        DebugView::Points => ViewKind::Points,
+        DebugView::Texels => ViewKind::Texels,
+        DebugView::Weights => ViewKind::Weights,
+        DebugView::Age => ViewKind::Age,
+        DebugView::Error => ViewKind::Error { other: lookup(other) },
+    };
+    let view =
+        |method, scissor| View { camera, viewport: None, scissor, kind, lookup: lookup(method), points };
+    let rect = |x: u32, width: u32| Some(Rect { x, y: 0, width, height: size.1 });
+    match options.split {
+        Some((at, method)) if options.view != DebugView::Error => {
+            let column = (f64::from(at.clamp(0.0, 1.0)) * f64::from(size.0)).round() as u32;
+            let left = (column > 0).then(|| view(options.method, rect(0, column)));
+            let right = (column < size.0).then(|| view(method, rect(column, size.0 - column)));
+            left.into_iter().chain(right).collect()
+        }
+        _ => vec![view(options.method, None)],
+    }
+}

@@ -1,0 +1,144 @@
+//! What a viewer is asked for, and what it says of itself.
+
+use dapple_gpu::{GpuFault, wgpu};
+use dapple_render::forward::ForwardError;
+use dapple_render::image::ToneMap;
+use dapple_render::shade::ShadeParams;
+use dapple_stream::Limits;
+
+/// What a viewer is made for.
+#[derive(Clone, Debug)]
+pub struct ViewerConfig {
+    /// Format of the textures it draws to. Colours are written sRGB-encoded: where the format encodes by itself (`…Srgb`),
+    /// hand over views of the plain format.
+    pub format: wgpu::TextureFormat,
+    /// Samples a pixel, 1 or 4. Default 4.
+    pub samples: u32,
+    /// Whether textures get smaller levels for surfaces far away. Default true; the processor's pictures have none.
+    pub mips: bool,
+    /// Lights, ambient, shadow maps.
+    pub shade: ShadeParams,
+    /// What it takes from a server. The number of sets is raised to the scene's instances, the most a server can send.
+    pub limits: Limits,
+}
+
+impl ViewerConfig {
+    /// The defaults, for targets of one format.
+    pub fn new(format: wgpu::TextureFormat) -> ViewerConfig {
+        let (shade, limits) = (ShadeParams::default(), Limits::default());
+        ViewerConfig { format, samples: 4, mips: true, shade, limits }
+    }
+}
+
+/// How the visibility in a picture is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Method {
+    /// Not at all: everything is open.
+    None,
+    /// Points, through the visibility atlas.
+    #[default]
+    Psao,
+    /// Points, by the paper's look-up ([Neff2023] sec. 3.5).
+    PsaoPaper,
+}
+
+/// What a picture shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum DebugView {
+    /// The lit scene.
+    #[default]
+    Beauty,
+    /// Visibility, white is open.
+    Visibility,
+    /// Shading normals in the world as colours.
+    Normal,
+    /// The points themselves, in the shade of their visibility.
+    Points,
+    /// The texels of the atlas, charts in different colours.
+    Texels,
+    /// How many points a texel depends on, and how much the heaviest weighs.
+    Weights,
+    /// Time since the visibility last changed: yellow is new, dark blue ten seconds and more.
+    Age,
+    /// Difference of the method and the one of a split screen (of no method at all without a split).
+    Error,
+}
+
+/// How one picture is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DrawOptions {
+    /// What it shows.
+    pub view: DebugView,
+    /// How visibility is found.
+    pub method: Method,
+    /// Right of this part of the width (0 … 1) the other method is shown.
+    pub split: Option<(f32, Method)>,
+    /// Fade from the last update to this one over so many seconds; 0 shows updates as they come. Default 1/15.
+    pub fade_s: f32,
+    /// Radiance to display.
+    pub tone_map: ToneMap,
+}
+
+impl Default for DrawOptions {
+    fn default() -> Self {
+        DrawOptions {
+            view: DebugView::default(),
+            method: Method::default(),
+            split: None,
+            fade_s: 1.0 / 15.0,
+            tone_map: ToneMap::default(),
+        }
+    }
+}
+
+/// Work of a viewer after a snapshot, in texels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LoadProgress {
+    /// Done.
+    pub done: u64,
+    /// Of how many; 0 before the first snapshot.
+    pub total: u64,
+}
+
+impl LoadProgress {
+    /// Whether nothing is left to do.
+    pub fn is_complete(&self) -> bool {
+        self.done >= self.total
+    }
+}
+
+/// Figures for an overlay.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ViewerStats {
+    /// Points of the store.
+    pub points: u32,
+    /// Bytes received since the start.
+    pub bytes_received: u64,
+    /// Frames received since the start.
+    pub frames_received: u64,
+    /// Points changed by the last frame.
+    pub changed: u32,
+    /// Texels of the atlas, gaps included.
+    pub texels: u32,
+    /// Memory in bytes: of store, weights and atlas on the heap; of meshes and atlas on the card.
+    pub memory_bytes: (u64, u64),
+    /// When the last frame arrived (the `now_s` it came with), seconds.
+    pub last_frame_s: Option<f64>,
+    /// Lights of the last picture that were left out, because a frame takes at most
+    /// [`MAX_LIGHTS`](dapple_render::forward::MAX_LIGHTS).
+    pub ignored_lights: u32,
+}
+
+/// Why a viewer cannot be made or draw.
+#[derive(Debug, thiserror::Error)]
+pub enum ViewerError {
+    /// The camera, scene or size cannot be drawn.
+    #[error(transparent)]
+    Forward(#[from] ForwardError),
+    /// The device failed; after a loss nothing works until everything is made anew on another.
+    #[error(transparent)]
+    Fault(#[from] GpuFault),
+    /// The points do not fit the paper's structure.
+    #[error(transparent)]
+    Tables(#[from] dapple_render::psao::TableError),
+}

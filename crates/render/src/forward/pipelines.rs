@@ -1,0 +1,334 @@
+//! Pipelines, each made once when it is first needed.
+
+use std::collections::BTreeMap;
+
+use dapple_gpu::{Gpu, join, shader_module, wgpu};
+use dapple_scene::{AlphaMode, Scene};
+
+use super::layouts;
+use super::lookup::{LOOKUP_INPUT_WGSL, Lookup};
+use super::scene::vertex_layouts;
+
+pub(super) const MATH_WGSL: &str = include_str!("wgsl/math.wgsl");
+pub(super) const FRAME_WGSL: &str = include_str!("wgsl/frame.wgsl");
+pub(super) const DEFORM_WGSL: &str = include_str!("wgsl/deform.wgsl");
+pub(super) const MATERIAL_WGSL: &str = include_str!("wgsl/material.wgsl");
+pub(super) const RAMP_WGSL: &str = include_str!("wgsl/ramp.wgsl");
+pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// The files of the forward pass with one look-up.
+pub(super) fn forward_module(lookup: &Lookup) -> String {
+    let mut files = vec![
+        FRAME_WGSL,
+        MATH_WGSL,
+        DEFORM_WGSL,
+        MATERIAL_WGSL,
+        include_str!("wgsl/vertex.wgsl"),
+        include_str!("wgsl/display.wgsl"),
+        include_str!("wgsl/brdf.wgsl"),
+        include_str!("wgsl/light.wgsl"),
+        include_str!("wgsl/fragment.wgsl"),
+        include_str!("wgsl/inspect.wgsl"),
+        LOOKUP_INPUT_WGSL,
+    ];
+    files.extend_from_slice(&lookup.wgsl);
+    join(&files)
+}
+
+/// The files of the shadow maps.
+pub(super) fn caster_module() -> String {
+    join(&[MATH_WGSL, DEFORM_WGSL, MATERIAL_WGSL, include_str!("wgsl/caster.wgsl")])
+}
+
+/// The files of the points.
+pub(super) fn points_module() -> String {
+    join(&[FRAME_WGSL, MATH_WGSL, RAMP_WGSL, include_str!("wgsl/points.wgsl")])
+}
+
+/// The files of the error view.
+pub(super) fn error_module() -> String {
+    join(&[RAMP_WGSL, include_str!("wgsl/error.wgsl")])
+}
+
+/// What tells one pipeline of the forward pass from another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct PipelineKey {
+    pub(super) lookup: usize,
+    pub(super) detailed: bool,
+    pub(super) mirrored: bool,
+    pub(super) two_sided: bool,
+    pub(super) cuts_holes: bool,
+    pub(super) blends: bool,
+    pub(super) inspects: bool,
+}
+
+/// All pipelines that draw into the picture.
+#[derive(Debug)]
+pub(super) struct Pipelines {
+    format: wgpu::TextureFormat,
+    samples: u32,
+    lookups: Vec<LookupPipelines>,
+    made: BTreeMap<PipelineKey, wgpu::RenderPipeline>,
+    pub(super) points: wgpu::RenderPipeline,
+    pub(super) error: wgpu::RenderPipeline,
+}
+
+#[derive(Debug)]
+struct LookupPipelines {
+    module: wgpu::ShaderModule,
+    layout: wgpu::PipelineLayout,
+    needs_rest: bool,
+}
+
+impl Pipelines {
+    pub(super) fn new(gpu: &Gpu, format: wgpu::TextureFormat, samples: u32, lookups: &[Lookup]) -> Pipelines {
+        let device = &gpu.device;
+        let groups = [layouts::frame(device), layouts::material(device), layouts::surface(device)];
+        let lookups = lookups.iter().map(|lookup| {
+            let mut layouts: Vec<_> = groups.iter().map(Some).collect();
+            if let Some(layout) = &lookup.layout {
+                layouts.push(Some(layout));
+            }
+            LookupPipelines {
+                module: shader_module(device, lookup.label, &forward_module(lookup)),
+                layout: device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                    label: Some(lookup.label),
+                    bind_group_layouts: &layouts,
+                    immediate_size: 0,
+                }),
+                needs_rest: lookup.needs_rest,
+            }
+        });
+        let lookups = lookups.collect();
+        Pipelines {
+            format,
+            samples,
+            lookups,
+            made: BTreeMap::new(),
+            points: points(device, &groups[0], format, samples),
+            error: error(device, format, samples),
+        }
+    }
+
+    /// Makes a pipeline unless it is there already.
+    pub(super) fn prepare(&mut self, gpu: &Gpu, key: PipelineKey) {
+        if !self.made.contains_key(&key) {
+            let pipeline = self.make(gpu, key);
+            self.made.insert(key, pipeline);
+        }
+    }
+
+    /// A prepared pipeline.
+    pub(super) fn get(&self, key: PipelineKey) -> Option<&wgpu::RenderPipeline> {
+        self.made.get(&key)
+    }
+
+    fn make(&self, gpu: &Gpu, key: PipelineKey) -> wgpu::RenderPipeline {
+        let lookup = &self.lookups[key.lookup];
+        let flag = |on: bool| f64::from(u8::from(on));
+        let rest = ("NEEDS_REST", flag(lookup.needs_rest));
+        let fragment_constants = [
+            rest,
+            ("CUTS_HOLES", flag(key.cuts_holes)),
+            ("BLENDS", flag(key.blends)),
+            ("INSPECTS", flag(key.inspects)),
+        ];
+        let options = |constants| wgpu::PipelineCompilationOptions { constants, ..Default::default() };
+        gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("forward"),
+            layout: Some(&lookup.layout),
+            vertex: wgpu::VertexState {
+                module: &lookup.module,
+                entry_point: Some(if key.detailed { "vertex_detailed" } else { "vertex_plain" }),
+                compilation_options: options(&[rest]),
+                buffers: &vertex_layouts(key.detailed),
+            },
+            primitive: wgpu::PrimitiveState {
+                front_face: if key.mirrored { wgpu::FrontFace::Cw } else { wgpu::FrontFace::Ccw },
+                cull_mode: (!key.two_sided).then_some(wgpu::Face::Back),
+                ..Default::default()
+            },
+            depth_stencil: Some(depth(!key.blends)),
+            multisample: multisample(self.samples),
+            fragment: Some(wgpu::FragmentState {
+                module: &lookup.module,
+                entry_point: Some("fragment"),
+                compilation_options: options(&fragment_constants),
+                targets: &[Some(wgpu::ColorTargetState {
+                    format: self.format,
+                    blend: key.blends.then_some(wgpu::BlendState::ALPHA_BLENDING),
+                    write_mask: wgpu::ColorWrites::ALL,
+                })],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    }
+}
+
+fn depth(writes: bool) -> wgpu::DepthStencilState {
+    wgpu::DepthStencilState {
+        format: DEPTH_FORMAT,
+        depth_write_enabled: Some(writes),
+        // Reverse z.
+        depth_compare: Some(wgpu::CompareFunction::Greater),
+        stencil: wgpu::StencilState::default(),
+        bias: wgpu::DepthBiasState::default(),
+    }
+}
+
+fn multisample(count: u32) -> wgpu::MultisampleState {
+    wgpu::MultisampleState { count, ..Default::default() }
+}
+
+/// Vertex buffer of points: place and value.
+const POINT: [wgpu::VertexAttribute; 2] = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32];
+
+fn points(
+    device: &wgpu::Device,
+    frame: &wgpu::BindGroupLayout,
+    format: wgpu::TextureFormat,
+    samples: u32,
+) -> wgpu::RenderPipeline {
+    let buffers = [Some(wgpu::VertexBufferLayout {
+        array_stride: 16,
+        step_mode: wgpu::VertexStepMode::Instance,
+        attributes: &POINT,
+    })];
+    let module = shader_module(device, "points", &points_module());
+    plain(
+        device,
+        Plain {
+            label: "points",
+            layout: frame,
+            module: &module,
+            entry_points: ["point_vertex", "point_fragment"],
+            buffers: &buffers,
+            topology: wgpu::PrimitiveTopology::TriangleStrip,
+            depth: depth(true),
+            format,
+            samples,
+        },
+    )
+}
+
+fn error(device: &wgpu::Device, format: wgpu::TextureFormat, samples: u32) -> wgpu::RenderPipeline {
+    let module = shader_module(device, "error", &error_module());
+    plain(
+        device,
+        Plain {
+            label: "error",
+            layout: &layouts::error(device),
+            module: &module,
+            entry_points: ["error_vertex", "error_fragment"],
+            buffers: &[],
+            topology: wgpu::PrimitiveTopology::TriangleList,
+            depth: wgpu::DepthStencilState {
+                depth_compare: Some(wgpu::CompareFunction::Always),
+                ..depth(false)
+            },
+            format,
+            samples,
+        },
+    )
+}
+
+struct Plain<'a> {
+    label: &'a str,
+    layout: &'a wgpu::BindGroupLayout,
+    module: &'a wgpu::ShaderModule,
+    entry_points: [&'a str; 2],
+    buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
+    topology: wgpu::PrimitiveTopology,
+    depth: wgpu::DepthStencilState,
+    format: wgpu::TextureFormat,
+    samples: u32,
+}
+
+/// A pipeline with one group and without options.
+fn plain(device: &wgpu::Device, p: Plain<'_>) -> wgpu::RenderPipeline {
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(p.label),
+        bind_group_layouts: &[Some(p.layout)],
+        immediate_size: 0,
+    });
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(p.label),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module: p.module,
+            entry_point: Some(p.entry_points[0]),
+            compilation_options: Default::default(),
+            buffers: p.buffers,
+        },
+        primitive: wgpu::PrimitiveState { topology: p.topology, ..Default::default() },
+        depth_stencil: Some(p.depth),
+        multisample: multisample(p.samples),
+        fragment: Some(wgpu::FragmentState {
+            module: p.module,
+            entry_point: Some(p.entry_points[1]),
+            compilation_options: Default::default(),
+            targets: &[Some(p.format.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
+
+/// The two pipelines of shadow maps.
+#[derive(Debug)]
+pub(super) struct CasterPipelines {
+    pub(super) solid: wgpu::RenderPipeline,
+    pub(super) masked: wgpu::RenderPipeline,
+}
+
+impl CasterPipelines {
+    pub(super) fn new(gpu: &Gpu) -> CasterPipelines {
+        let device = &gpu.device;
+        let module = shader_module(device, "casters", &caster_module());
+        let groups = [layouts::face(device), layouts::material(device), layouts::surface(device)];
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("casters"),
+            bind_group_layouts: &groups.each_ref().map(Some),
+            immediate_size: 0,
+        });
+        let make = |masked: bool| {
+            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some("casters"),
+                layout: Some(&layout),
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some(if masked { "caster_masked" } else { "caster_solid" }),
+                    compilation_options: Default::default(),
+                    buffers: &vertex_layouts(masked),
+                },
+                // Both sides cast.
+                primitive: wgpu::PrimitiveState::default(),
+                depth_stencil: Some(depth(true)),
+                multisample: multisample(1),
+                fragment: masked.then(|| wgpu::FragmentState {
+                    module: &module,
+                    entry_point: Some("caster_holes"),
+                    compilation_options: Default::default(),
+                    targets: &[],
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+        };
+        CasterPipelines { solid: make(false), masked: make(true) }
+    }
+
+    /// Whether a material whose alpha is the same everywhere is one hole.
+    pub(super) fn is_hole(&self, scene: &Scene, material: u32) -> bool {
+        let material = &scene.materials[material as usize];
+        let cutoff = match material.alpha_mode {
+            AlphaMode::Opaque => return false,
+            AlphaMode::Mask { cutoff } => cutoff,
+            AlphaMode::Blend => 0.5,
+        };
+        // Texture coordinates are zero where there are none.
+        let uv = [glam::Vec2::ZERO; 2];
+        crate::texture::base_color(scene, material, &uv, glam::Vec4::ONE).w < cutoff
+    }
+}

@@ -1,0 +1,98 @@
+//! Puts the page together: glue for the compiled program, the page's own files, and a check of the size.
+//!
+//! `assemble-web PROGRAM.wasm PAGE_FOLDER OUT_FOLDER`
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode, Stdio};
+
+use anyhow::{Context, Result, bail};
+use wasm_bindgen_cli_support::Bindgen;
+
+/// Name of the glue (`.js`) and, with `_bg`, of the program (`.wasm`).
+const NAME: &str = "dapple_web";
+/// Most bytes of the program as a server sends it, compressed.
+const MAX_GZIPPED_BYTES: usize = 1_500_000;
+
+fn main() -> ExitCode {
+    let arguments: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
+    let [program, page, out] = arguments.as_slice() else {
+        eprintln!("assemble-web takes PROGRAM.wasm PAGE_FOLDER OUT_FOLDER");
+        return ExitCode::FAILURE;
+    };
+    match assemble(program, page, out) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn assemble(program: &Path, page: &Path, out: &Path) -> Result<()> {
+    std::fs::create_dir_all(out).with_context(|| format!("cannot make {}", out.display()))?;
+    let mut bindgen = Bindgen::new();
+    bindgen
+        .input_path(program)
+        .out_name(NAME)
+        .typescript(false)
+        .remove_name_section(true)
+        .remove_producers_section(true)
+        .web(true)?;
+    bindgen.generate(out).with_context(|| format!("cannot make the glue of {}", program.display()))?;
+    for file in std::fs::read_dir(page).with_context(|| format!("cannot list {}", page.display()))? {
+        let from = file?.path();
+        if let (true, Some(name)) = (from.is_file(), from.file_name()) {
+            std::fs::copy(&from, out.join(name))
+                .with_context(|| format!("cannot copy {}", from.display()))?;
+        }
+    }
+
+    let wasm = out.join(format!("{NAME}_bg.wasm"));
+    let plain = size(&wasm)?;
+    let shrunk = shrink(&wasm)?;
+    let (whole, gzipped) = size(&wasm)?;
+    let note = match shrunk {
+        true => format!("; {} before wasm-opt", megabytes(plain.1)),
+        false => "; wasm-opt (Binaryen), which would make it smaller, is not installed".to_owned(),
+    };
+    println!("{}: {}, {} gzipped{note}", wasm.display(), megabytes(whole), megabytes(gzipped));
+    if gzipped > MAX_GZIPPED_BYTES {
+        // Not a failure while the program is known to be over it.
+        eprintln!(
+            "warning: the page's program has {gzipped} bytes gzipped, more than {MAX_GZIPPED_BYTES}: look for what came \
+             in last (`cargo tree -p dapple-web --target wasm32-unknown-unknown`)"
+        );
+    }
+    Ok(())
+}
+
+/// Runs wasm-opt where there is one; false where there is none.
+fn shrink(wasm: &Path) -> Result<bool> {
+    let found =
+        Command::new("wasm-opt").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+    if !found.is_ok_and(|status| status.success()) {
+        return Ok(false);
+    }
+    let status = Command::new("wasm-opt")
+        .args(["-O3", "--all-features", "--disable-custom-descriptors", "-o"])
+        .args([wasm, wasm])
+        .status()
+        .context("cannot start wasm-opt")?;
+    if !status.success() {
+        bail!("wasm-opt ended with {status}");
+    }
+    Ok(true)
+}
+
+/// Bytes of a file, and of the same compressed by gzip at its best.
+fn size(path: &Path) -> Result<(usize, usize)> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
+    encoder.write_all(&bytes)?;
+    Ok((bytes.len(), encoder.finish()?.len()))
+}
+
+fn megabytes(bytes: usize) -> String {
+    format!("{:.2} MB", bytes as f64 / 1e6)
+}

@@ -1,0 +1,76 @@
+//! Builds the page: `cargo xtask wasm`.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, bail};
+
+const TARGET: &str = "wasm32-unknown-unknown";
+const PROFILE: &str = "wasm-release";
+
+/// Whether programs for browsers can be compiled here.
+pub(crate) fn has_target() -> bool {
+    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let output = Command::new(rustc)
+        .args(["--print", "target-libdir", "--target", TARGET])
+        .stdin(Stdio::null())
+        .stderr(Stdio::null())
+        .output();
+    output.is_ok_and(|output| Path::new(String::from_utf8_lossy(&output.stdout).trim()).is_dir())
+}
+
+/// Installs what drives a browser in the page's tests, where there is npm and it is not installed yet. That there is
+/// none is no error: those tests then say that they were skipped.
+pub(crate) fn install_driver(root: &Path) {
+    let folder = root.join("apps/web/tests/browser");
+    // npm leaves this file behind when it is done; it is as old as what it installed.
+    let modified = |path: &str| folder.join(path).metadata().and_then(|metadata| metadata.modified()).ok();
+    let (installed, wanted) = (modified("node_modules/.package-lock.json"), modified("package-lock.json"));
+    if installed >= wanted {
+        return;
+    }
+    let npm = if cfg!(windows) { "npm.cmd" } else { "npm" };
+    println!("{npm} ci");
+    let status = Command::new(npm)
+        .args(["ci", "--ignore-scripts", "--no-audit", "--no-fund"])
+        .current_dir(&folder)
+        .stdin(Stdio::null())
+        .status();
+    match status {
+        Ok(status) if status.success() => {}
+        Ok(status) => println!("npm ended with {status}: no browser will be driven in tests"),
+        Err(_) => println!("npm is not installed: no browser will be driven in tests"),
+    }
+}
+
+/// Builds the page into `web` of the build folder; `cargo` runs cargo in the workspace.
+pub(crate) fn build(root: &Path, target_folder: &Path, cargo: impl Fn(&[&str]) -> Result<()>) -> Result<()> {
+    if !has_target() {
+        bail!("Rust cannot compile for browsers here: run `rustup target add {TARGET}`");
+    }
+    let profile = format!("--profile={PROFILE}");
+    cargo(&[
+        "rustc",
+        "--package=dapple-web",
+        "--lib",
+        "--crate-type=cdylib",
+        &format!("--target={TARGET}"),
+        &profile,
+    ])?;
+    let program = target_folder.join(TARGET).join(PROFILE).join("dapple_web.wasm");
+    let [program, page, out] = [program, root.join("apps/web/page"), target_folder.join("web")];
+    let path = |path: &Path| path.to_str().map(str::to_owned).context("a folder's name is not UTF-8");
+    cargo(&[
+        "run",
+        "--quiet",
+        "--package=xtask",
+        "--features=web",
+        "--bin=assemble-web",
+        "--",
+        &path(&program)?,
+        &path(&page)?,
+        &path(&out)?,
+    ])?;
+    println!("the page: {}, for any static server", out.join("index.html").display());
+    Ok(())
+}
