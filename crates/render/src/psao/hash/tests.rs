@@ -6,7 +6,6 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::gbuffer::RestSurface;
-use crate::psao::{Kernel, PointIndex, reconstruct};
 
 const SPACING: f32 = 0.125;
 const QUANTUM: f32 = SPACING / 32.0;
@@ -58,23 +57,50 @@ fn cells_that_find_their_bucket_full_are_counted() {
     assert_eq!(kept + paper.overflow().points() as usize, 64);
 }
 
+/// [Neff2023] eq. 2 to 4 over all points as they are packed, without cells: what the structure must find.
+fn hat_over_packed_points(layout: &PointLayout, values: &[u8], fragment: &RestSurface) -> f32 {
+    let hat = Hat::default();
+    let set = &layout.sets()[0];
+    let (r, edge) = (hat.radius * SPACING, 2.0 * hat.radius * SPACING);
+    let (mut sum, mut weights) = (0.0f64, 0.0f64);
+    for (i, &value) in values.iter().enumerate() {
+        let position_cells = (set.position_rest(i, QUANTUM) - set.origin_rest) / edge;
+        let cell = position_cells.floor();
+        let normal = pack::pack_normal(set.normal_rest(i));
+        let word = pack::pack(position_cells, cell.to_array().map(|c| c as u32), normal, value);
+        let position_rest = set.origin_rest + (cell + pack::position_in_cell(word)) * edge;
+        let to_point = position_rest - fragment.position_rest;
+        let (distance, point_normal) = (to_point.length(), pack::normal(word));
+        let along = point_normal.dot(to_point) / distance;
+        if distance < r
+            && point_normal.dot(fragment.normal_rest) > hat.normal_threshold
+            && along * along < hat.direction_threshold
+        {
+            let alpha = f64::from((r - distance) / r);
+            sum += alpha * f64::from(value);
+            weights += alpha;
+        }
+    }
+    if weights > 0.0 { (sum / weights / 255.0) as f32 } else { 1.0 }
+}
+
 #[test]
-#[ignore = "its bound has not been settled"]
-fn it_is_the_hat_up_to_the_quantised_positions() {
+fn it_is_the_hat_over_the_points_as_they_are_packed() {
     let layout = floor();
     let values: Vec<u8> =
         (0..layout.len()).map(|i| 100 + (layout.sets()[0].positions[i][0] / 8) as u8).collect();
     let paper = PointHash::new(&layout, &values, Hat::default()).unwrap();
     assert_eq!(paper.overflow(), Overflow::default());
-    let fragments: Vec<_> = (0..300)
-        .map(|i| Some(at(&layout, i as f32 * 0.06 + 0.5, 0.02, (i * 7 % 300) as f32 * 0.06 + 0.5)))
-        .collect();
-    let index = PointIndex::new(&layout);
-    let reference = reconstruct(&index, &values, &Kernel::Hat(Hat::default()), &fragments);
-    for (a, b) in paper.reconstruct(&fragments).iter().zip(&reference) {
-        // Half a 32nd of a cell of two spacings; values rise by 4 a spacing, weights shift a little.
-        assert!((a - b).abs() < 1.5 / 255.0, "{a} instead of {b}");
+    let mut covered = 0;
+    for i in 0..300 {
+        let (x, z) = (i as f32 * 0.06 + 0.5, (i * 7 % 300) as f32 * 0.06 + 0.5);
+        let fragment = at(&layout, x, 0.02, z);
+        let (found, expected) =
+            (paper.visibility(&fragment), hat_over_packed_points(&layout, &values, &fragment));
+        assert!((found - expected).abs() < 1e-5, "{found} instead of {expected} at {x}, {z}");
+        covered += usize::from(expected < 1.0);
     }
+    assert!(covered > 290, "{covered} fragments have points near");
 }
 
 #[test]
@@ -105,11 +131,10 @@ fn other_instances_other_sides_and_far_places_are_open() {
 }
 
 #[test]
-#[ignore = "its bound has not been settled"]
 fn a_grid_of_too_many_cells_is_refused() {
     let far = (1 << 21) - 1;
     let mut layout = layout(vec![[0, 0, 0], [far, far, far]]);
-    assert!(PointHash::new(&layout, &[0, 0], Hat { radius: 16.0, ..Hat::default() }).is_ok());
+    assert!(PointHash::new(&layout, &[0, 0], Hat { radius: 32.0, ..Hat::default() }).is_ok());
     layout = PointLayout::new(QUANTUM, SPACING / 16.0, layout.sets().to_vec()).unwrap();
     let error = PointHash::new(&layout, &[0, 0], Hat::default()).unwrap_err();
     assert!(matches!(error, TableError::GridTooLarge { instance: 2, .. }), "{error}");
@@ -128,7 +153,8 @@ proptest! {
         let word = pack::pack(inside + Vec3::new(3.0, 0.0, 9.0), cell, pack::pack_normal(n), visibility);
         prop_assert!(word >> 31 == 1);
         prop_assert!((pack::position_in_cell(word) - inside).abs().max_element() <= 0.5 / 32.0 + 1e-5);
-        prop_assert!(pack::normal(word).dot(n) > 0.93, "{} became {}", n, pack::normal(word));
+        // Seven steps to a side: 17.2 degrees at the worst, about (5, 5, 4).
+        prop_assert!(pack::normal(word).dot(n) > 0.955, "{} became {}", n, pack::normal(word));
         prop_assert_eq!(pack::visibility(word), f32::from(visibility));
         let changed = pack::with_visibility(word, other);
         prop_assert_eq!(pack::visibility(changed), f32::from(other));
