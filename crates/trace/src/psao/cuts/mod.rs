@@ -112,7 +112,7 @@ struct Test<'a> {
 }
 
 impl Test<'_> {
-    /// The candidates that are blocked from the site; none if hardly anything would be left.
+    /// The candidates that are blocked from the site; none if hardly anything would be left, or gone.
     fn mask(&self, site: &Site, candidates: &[Candidate]) -> u16 {
         let origin_world = site.position_rest + site.normal_rest * self.lift_m + self.offset;
         let target = |c: &Candidate| c.position_rest + c.normal_rest * self.lift_m + self.offset;
@@ -136,9 +136,12 @@ impl Test<'_> {
             left += if is_cut { 0.0 } else { candidate.weight() };
         }
         // A texel that lies beyond a wall serves the surface on this side, whatever stands between them.
-        if left < LEAST_LEFT * all { 0 } else { mask }
+        if left < LEAST_LEFT * all || left > MOST_LEFT * all { 0 } else { mask }
     }
 }
 
 /// Cuts that would leave less than this part of the weight are not made.
 const LEAST_LEFT: f32 = 0.05;
+
+/// Nor are those that would leave more than this: they are not worth their bytes.
+const MOST_LEFT: f32 = 0.95;

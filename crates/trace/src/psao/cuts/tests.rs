@@ -94,7 +94,8 @@ fn a_wall_cuts_exactly_what_lies_beyond_it() {
             let of = candidates.iter().filter(|c| (c.position_rest.dot(across) * side < 0.0) == beyond);
             of.map(|c| c.weight()).sum::<f32>()
         };
-        let spared = weight(false) < LEAST_LEFT * (weight(true) + weight(false));
+        let part_left = weight(false) / (weight(true) + weight(false));
+        let spared = !(LEAST_LEFT..=MOST_LEFT).contains(&part_left);
         for (bit, candidate) in candidates.iter().enumerate() {
             let beyond = candidate.position_rest.dot(across) * side < 0.0 && !spared;
             // The wall is as thin as a plane: a site on it is on either side.
