@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use dapple_client::clock::Clock;
+use dapple_client::rate::Rate;
 use dapple_client::viewer::{DebugView, DrawOptions, LoadProgress, Viewer, ViewerConfig};
 use dapple_render::shade::ShadeParams;
 use dapple_scene::{NoFiles, Scene};
@@ -12,8 +14,6 @@ use web_sys::HtmlCanvasElement;
 
 use crate::canvas::Screen;
 use crate::names;
-use crate::player::Clock;
-use crate::rate::Rate;
 use crate::steer::Steering;
 
 /// Seconds that are still drawn after the last change, for whatever settles late.

@@ -1,7 +1,7 @@
 //! The client in a browser tab: what the page's JavaScript (`page/dapple.js`) drives.
 //!
 //! ```text
-//! fetch, pointer, keys, frames of the display (JavaScript) ─► Core ─► player (which frame of the stream, when) ─► Viewer ─► canvas
+//! fetch, pointer, keys, frames of the display (JavaScript) ─► Core ─► clock and replay (which frame of the stream, when) ─► Viewer ─► canvas
 //! ```
 //!
 //! Requests, events and the clock are the page's; this side owns the canvas, and everything that is counted in points,
@@ -12,8 +12,6 @@ mod canvas;
 #[cfg(target_arch = "wasm32")]
 mod core;
 pub mod names;
-pub mod player;
-pub mod rate;
 #[cfg(target_arch = "wasm32")]
 mod steer;
 

@@ -87,11 +87,7 @@ impl Steering {
         if let Projection::Perspective { yfov, .. } = camera.projection {
             self.yfov = yfov;
         }
-        let bounds = scene.bounds_world(&scene.pose(time_s));
-        let eye = camera.eye_world();
-        let inside = eye.cmpge(bounds.min).all() && eye.cmple(bounds.max).all();
-        let distance = (0.5 * (bounds.min + bounds.max)).distance(eye);
-        Controls::from_camera(&camera, (!inside).then_some(distance))
+        Controls::take_over(&camera, &scene.bounds_world(&scene.pose(time_s)))
     }
 }
 

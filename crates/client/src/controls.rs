@@ -55,6 +55,13 @@ impl Controls {
         }
     }
 
+    /// Takes over from a camera by hand: on foot inside of `bounds`, around their middle from outside.
+    pub fn take_over(camera: &PosedCamera, bounds: &Aabb) -> Controls {
+        let eye = camera.eye_world();
+        let inside = eye.cmpge(bounds.min).all() && eye.cmple(bounds.max).all();
+        Controls::from_camera(camera, (!inside).then_some(bounds.center().distance(eye)))
+    }
+
     /// Circles the middle of `bounds`, all of which is in the picture: seen a little from above, along −Z.
     /// `yfov` is the vertical field of view (radians), `aspect` width / height. An empty box gives a view of the origin.
     pub fn fit(bounds: &Aabb, yfov: f32, aspect: f32) -> Controls {

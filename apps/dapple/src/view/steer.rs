@@ -52,7 +52,7 @@ impl Steering {
             (Aim::Hand(controls), _) => controls.camera(self.yfov),
             (Aim::Still(camera), _) => camera,
             (Aim::Path(index), Some(first)) => {
-                self.paths.get(index).unwrap_or(first).camera(scene, &scene.pose(time_s))
+                self.paths.get(index).unwrap_or(first).camera(scene, &scene.pose_undeformed(time_s))
             }
             (Aim::Path(_), None) => PosedCamera::look_at(Vec3::ONE, Vec3::ZERO, self.yfov),
         }
@@ -153,10 +153,6 @@ impl Steering {
         if let Projection::Perspective { yfov, .. } = camera.projection {
             self.yfov = yfov;
         }
-        let bounds = scene.bounds_world(&scene.pose(time_s));
-        let eye = camera.eye_world();
-        let inside = eye.cmpge(bounds.min).all() && eye.cmple(bounds.max).all();
-        let distance = (0.5 * (bounds.min + bounds.max)).distance(eye);
-        Controls::from_camera(&camera, (!inside).then_some(distance))
+        Controls::take_over(&camera, &scene.bounds_world(&scene.pose(time_s)))
     }
 }
