@@ -145,6 +145,11 @@ impl Server {
         Ok(self.publisher.join()?)
     }
 
+    /// How many bytes of a snapshot are cuts.
+    pub fn cut_bytes(&self) -> usize {
+        self.publisher.cut_bytes()
+    }
+
     /// What has been published.
     pub fn store(&self) -> &PointStore {
         self.updater.store()

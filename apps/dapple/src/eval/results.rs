@@ -57,6 +57,8 @@ pub(crate) struct Row {
     pub(crate) flip: f64,
     pub(crate) kbit_per_s: Option<f64>,
     pub(crate) snapshot_bytes: Option<u64>,
+    /// Of the snapshot: which points do not count at which texels.
+    pub(crate) cut_bytes: Option<u64>,
     pub(crate) points: Option<u64>,
     pub(crate) rays: u64,
     pub(crate) server_ms: Option<f64>,

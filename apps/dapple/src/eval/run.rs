@@ -314,6 +314,7 @@ impl Line {
             flip: mean(|f| f.flip),
             kbit_per_s: pair.map(|p| p.delta_bytes as f64 * 8.0 / 1000.0 / settings.seconds),
             snapshot_bytes: pair.map(|p| p.snapshot_bytes),
+            cut_bytes: pair.map(|p| p.server.cut_bytes() as u64),
             points: pair.map(|p| p.server.store().layout().len() as u64),
             rays: self.rays + pair.map_or(0, |p| p.rays),
             server_ms: pair.filter(|p| p.ticks > 0).map(|p| per_tick(p.server_seconds, p)),

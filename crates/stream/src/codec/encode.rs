@@ -17,8 +17,8 @@ const DELTA_LEVEL: i32 = 1;
 /// Most bits of a coordinate within its cell: they are coded as one byte.
 const MAX_LOCAL_BITS: u32 = 8;
 
-/// The layout part of a snapshot, with the cuts that belong to it.
-pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts) -> Result<Vec<u8>, std::io::Error> {
+/// The layout part of a snapshot with the cuts that belong to it, and how many of its bytes the cuts are.
+pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts) -> Result<(Vec<u8>, usize), std::io::Error> {
     let local_bits = local_bits(layout);
     let local_mask = (1u32 << local_bits) - 1;
     let mut out = Vec::new();
@@ -61,8 +61,10 @@ pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts) -> Result<Vec<u8>
     for section in [n0, n1, &cell_gaps, l0, l1, l2] {
         pack(&mut out, section, SNAPSHOT_LEVEL)?;
     }
+    let without_cuts = out.len();
     encode_cuts(&mut out, cuts)?;
-    Ok(out)
+    let cut_bytes = out.len() - without_cuts;
+    Ok((out, cut_bytes))
 }
 
 fn encode_cuts(out: &mut Vec<u8>, cuts: &Cuts) -> Result<(), std::io::Error> {

@@ -60,6 +60,8 @@ pub struct Publisher {
 struct State {
     layout: Arc<PointLayout>,
     layout_bytes: Vec<u8>,
+    /// How many of those are cuts.
+    cut_bytes: usize,
     visibility: Vec<u8>,
     group: u64,
     /// Epoch of the last change, not of the last call.
@@ -79,6 +81,11 @@ impl Publisher {
     /// has none. A layout that has been published keeps what it has.
     pub fn set_cuts(&mut self, layout: Arc<PointLayout>, cuts: Cuts) {
         self.cuts = Some((layout, cuts));
+    }
+
+    /// How many bytes of each snapshot are cuts; 0 before the first [`Publisher::publish`].
+    pub fn cut_bytes(&self) -> usize {
+        self.state.as_ref().map_or(0, |state| state.cut_bytes)
     }
 
     /// Publishes the state of the next epoch; epochs count the calls, from 0. Gives the frame for subscribers
@@ -108,12 +115,14 @@ impl Publisher {
             old => {
                 let given = self.cuts.as_ref().filter(|(layout, _)| same_layout(layout, store.layout()));
                 let none = Cuts::default();
-                let layout_bytes = encode_layout(store.layout(), given.map_or(&none, |(_, cuts)| cuts))?;
+                let (layout_bytes, cut_bytes) =
+                    encode_layout(store.layout(), given.map_or(&none, |(_, cuts)| cuts))?;
                 let group =
                     old.as_ref().map_or(self.config.first_group.min(u64::MAX >> 1), |state| state.group + 1);
                 let state = State {
                     layout: store.layout().clone(),
                     layout_bytes,
+                    cut_bytes,
                     visibility: store.visibility().to_vec(),
                     group,
                     epoch,
