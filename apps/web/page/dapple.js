@@ -7,6 +7,9 @@ import init, { Core } from "./dapple_web.js";
 import { fetchBytes, fetchChunks } from "./fetch.js";
 import { attachControls } from "./input.js";
 
+// Work between pictures, milliseconds at a stretch.
+const SLICE_MS = 8;
+
 // The program is fetched once, however many viewers a page has.
 let program;
 
@@ -30,7 +33,6 @@ class Viewer {
   #core = null;
   #abort = new AbortController();
   #texels = 4096;
-  #lastFrame = 0;
   #lastStats = 0;
   #ready = Promise.withResolvers?.() ?? withResolvers();
   #streamed = false;
@@ -142,13 +144,11 @@ class Viewer {
   #frame = (now) => {
     if (!this.#core) return;
     requestAnimationFrame(this.#frame);
-    const interval = Math.min(Math.max(now - this.#lastFrame, 4), 100);
-    this.#lastFrame = now;
-    const working = this.#work(Math.max(10, 0.5 * interval));
+    if (!this.#working) this.#workOn();
     this.#draw();
     if (!this.#core) return;
     // What was fetched last is taken by the first of these, causes work from the second on, and shows in the third.
-    this.#settled = this.#streamed && !working ? this.#settled + 1 : 0;
+    this.#settled = this.#streamed && !this.#working ? this.#settled + 1 : 0;
     if (this.#settled === 3) this.#ready.resolve();
     if (this.#options.onStats && now - this.#lastStats > (this.#options.statsInterval ?? 500)) {
       this.#lastStats = now;
@@ -166,34 +166,30 @@ class Viewer {
     }
   }
 
-  // Goes on with what a snapshot causes for about so many milliseconds; true while there is more.
-  #work(budget) {
+  // Goes on with what a snapshot causes, a few milliseconds at a time, between pictures however long those take.
+  #workOn = () => {
+    if (!this.#core) return;
     const start = performance.now();
-    for (;;) {
-      const before = performance.now();
-      let done, total;
-      try {
-        ({ done, total } = this.#core.work(this.#texels));
-      } catch (error) {
-        this.#fail(error instanceof Error ? error : new Error(String(error)));
-        return false;
+    let before = start;
+    try {
+      for (;;) {
+        const { done, total } = this.#core.work(this.#texels);
+        const after = performance.now();
+        const complete = done >= total;
+        if (this.#working || !complete) this.#progress("light", done, total);
+        this.#working = !complete;
+        if (complete) return;
+        // Pieces of about 2 ms.
+        if (after - before < 1) this.#texels = Math.min(this.#texels * 2, 1 << 20);
+        else if (after - before > 4) this.#texels = Math.max(this.#texels >> 1, 64);
+        if (after - start > SLICE_MS) break;
+        before = after;
       }
-      const after = performance.now();
-      if (done >= total) {
-        if (this.#working) this.#progress("light", total, total);
-        this.#working = false;
-        return false;
-      }
-      this.#working = true;
-      // Pieces of about 2 ms.
-      if (after - before < 1) this.#texels = Math.min(this.#texels * 2, 1 << 20);
-      else if (after - before > 4) this.#texels = Math.max(this.#texels >> 1, 64);
-      if (after - start > budget) {
-        this.#progress("light", done, total);
-        return true;
-      }
+      setTimeout(this.#workOn);
+    } catch (error) {
+      this.#fail(error instanceof Error ? error : new Error(String(error)));
     }
-  }
+  };
 
   #fail(error) {
     if (this.#abort.signal.aborted) return;

@@ -4,7 +4,7 @@
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Stdio};
+use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use wasm_bindgen_cli_support::Bindgen;
@@ -49,40 +49,15 @@ fn assemble(program: &Path, page: &Path, out: &Path) -> Result<()> {
     }
 
     let wasm = out.join(format!("{NAME}_bg.wasm"));
-    let plain = size(&wasm)?;
-    let shrunk = shrink(&wasm)?;
     let (whole, gzipped) = size(&wasm)?;
-    let note = match shrunk {
-        true => format!("; {} before wasm-opt", megabytes(plain.1)),
-        false => "; wasm-opt (Binaryen), which would make it smaller, is not installed".to_owned(),
-    };
-    println!("{}: {}, {} gzipped{note}", wasm.display(), megabytes(whole), megabytes(gzipped));
+    println!("{}: {}, {} gzipped", wasm.display(), megabytes(whole), megabytes(gzipped));
     if gzipped > MAX_GZIPPED_BYTES {
-        // Not a failure while the program is known to be over it.
-        eprintln!(
-            "warning: the page's program has {gzipped} bytes gzipped, more than {MAX_GZIPPED_BYTES}: look for what came \
-             in last (`cargo tree -p dapple-web --target wasm32-unknown-unknown`)"
+        bail!(
+            "the page's program has {gzipped} bytes gzipped, more than {MAX_GZIPPED_BYTES}: look for what came in last \
+             (`cargo tree -p dapple-web --target wasm32-unknown-unknown`)"
         );
     }
     Ok(())
-}
-
-/// Runs wasm-opt where there is one; false where there is none.
-fn shrink(wasm: &Path) -> Result<bool> {
-    let found =
-        Command::new("wasm-opt").arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
-    if !found.is_ok_and(|status| status.success()) {
-        return Ok(false);
-    }
-    let status = Command::new("wasm-opt")
-        .args(["-O3", "--all-features", "--disable-custom-descriptors", "-o"])
-        .args([wasm, wasm])
-        .status()
-        .context("cannot start wasm-opt")?;
-    if !status.success() {
-        bail!("wasm-opt ended with {status}");
-    }
-    Ok(true)
 }
 
 /// Bytes of a file, and of the same compressed by gzip at its best.

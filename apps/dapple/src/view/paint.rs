@@ -12,6 +12,8 @@ pub(super) struct Painter {
     context: egui::Context,
     input: egui_winit::State,
     renderer: Renderer,
+    /// What panels leave free of the window, in the overlay's units.
+    free: egui::Rect,
 }
 
 impl Painter {
@@ -29,12 +31,20 @@ impl Painter {
             Some(most),
         );
         let renderer = Renderer::new(&screen.gpu.device, screen.format(), RendererOptions::default());
-        Painter { context, input, renderer }
+        Painter { context, input, renderer, free: egui::Rect::EVERYTHING }
     }
 
-    /// Hands an event to the overlay; true if it takes it for itself.
-    pub(super) fn takes(&mut self, window: &Window, event: &WindowEvent) -> bool {
-        self.input.on_window_event(window, event).consumed
+    /// Hands an event to the overlay.
+    pub(super) fn tell(&mut self, window: &Window, event: &WindowEvent) {
+        let _ = self.input.on_window_event(window, event);
+    }
+
+    /// Whether the overlay lies over a pixel. The library itself only knows where the pointer was when it was last laid
+    /// out, which may be long ago.
+    pub(super) fn covers(&self, (x, y): (f64, f64)) -> bool {
+        let at = egui::pos2(x as f32, y as f32) / self.context.pixels_per_point();
+        let above = self.context.layer_id_at(at).is_some_and(|layer| layer.order != egui::Order::Background);
+        above || !self.free.contains(at)
     }
 
     /// Whether it moves by itself.
@@ -52,7 +62,10 @@ impl Painter {
         let input = self.input.take_egui_input(&screen.window);
         let mut wish = None;
         // A layout may be made twice; what it asks for is wished once.
-        let mut output = self.context.run_ui(input, |ui| wish = lay(ui).or(wish.take()));
+        let mut output = self.context.run_ui(input, |ui| {
+            wish = lay(ui).or(wish.take());
+            self.free = ui.available_rect_before_wrap();
+        });
         self.input.handle_platform_output(&screen.window, output.platform_output);
         let (width, height) = screen.size();
         let descriptor =

@@ -186,14 +186,13 @@ impl Session {
             // The overlay is worked with the pointer; keys are all the picture's.
             return self.key(event, now_s);
         }
-        if self.painter.takes(&self.screen.window, event) && self.pointer.drag.is_none() {
-            return Ok(());
-        }
+        self.painter.tell(&self.screen.window, event);
+        let covered = self.pointer.at.is_some_and(|at| self.painter.covers(at));
         let (scene, time_s) = (self.show.scene.clone(), self.show.clock.time_s());
         let steering = &mut self.show.steering;
         match event {
             WindowEvent::ModifiersChanged(modifiers) => self.pointer.shift = modifiers.state().shift_key(),
-            WindowEvent::MouseInput { state: ElementState::Pressed, button, .. } => {
+            WindowEvent::MouseInput { state: ElementState::Pressed, button, .. } if !covered => {
                 self.pointer.drag = Some(*button != MouseButton::Left || self.pointer.shift);
             }
             WindowEvent::MouseInput { state: ElementState::Released, .. } => self.pointer.drag = None,
@@ -209,7 +208,7 @@ impl Session {
                 }
                 self.pointer.at = Some(to);
             }
-            WindowEvent::MouseWheel { delta, .. } => {
+            WindowEvent::MouseWheel { delta, .. } if !covered => {
                 let lines = match delta {
                     MouseScrollDelta::LineDelta(_, lines) => *lines,
                     MouseScrollDelta::PixelDelta(pixels) => pixels.y as f32 * 0.01,
