@@ -19,7 +19,8 @@ pub const MOST_TEXELS: u32 = 1 << 21;
 pub struct ChartParams {
     /// Edge of a texel in rest space, metres.
     pub texel_m: f32,
-    /// Least cosine between the normal of a triangle and that of its chart. Default 0.7 (45°).
+    /// Least cosine between the normal of a triangle and that of its chart. Default 0.8 (37°): the faces of a
+    /// 45° bevel get charts of their own, whose values differ most.
     pub least_cosine: f32,
     /// Longest side of a page, texels, 16 … 2047. Default 1024.
     pub max_side: u16,
@@ -33,7 +34,7 @@ impl ChartParams {
     /// move, with the other parameters at their defaults.
     pub fn for_spacing(spacing_m: f32, moves: bool) -> ChartParams {
         let texel_m = spacing_m * if moves { 0.5 } else { 0.75 };
-        ChartParams { texel_m, least_cosine: 0.7, max_side: 1024, mirrored: false }
+        ChartParams { texel_m, least_cosine: 0.8, max_side: 1024, mirrored: false }
     }
 
     fn check(&self) -> Result<(), ChartError> {

@@ -26,7 +26,8 @@ const MOST_NEAR: usize = 4096;
 /// How a texel's points are chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WeightParams {
-    /// The kernel of the fit.
+    /// The kernel of the fit. The default is that of the direct fit, except that `plane` is 512: texels lie on the planes
+    /// of triangles, where fragments of curved surfaces need not.
     pub kernel: MovingLeastSquares,
     /// Most points of a texel, 1 … [`MAX_WEIGHTS`].
     pub most: usize,
@@ -34,7 +35,7 @@ pub struct WeightParams {
 
 impl Default for WeightParams {
     fn default() -> Self {
-        WeightParams { kernel: MovingLeastSquares::default(), most: 6 }
+        WeightParams { kernel: MovingLeastSquares { plane: 512.0, ..MovingLeastSquares::default() }, most: 6 }
     }
 }
 
