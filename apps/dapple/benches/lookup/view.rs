@@ -74,12 +74,10 @@ impl View {
                 return [value, value, -2.0, 1.0];
             }
             let (page, x, y) = charts.texel_at(sample.triangle as usize, sample.barycentrics);
-            let placements = if back {
-                atlas.back_placements(fragment.instance)
-            } else {
-                atlas.placements(fragment.instance)
-            };
-            match placements.get(usize::from(page)) {
+            let places = atlas.placements(fragment.instance);
+            // Those of the back, if it has its own, follow.
+            let first = if back && places.len() > charts.pages().len() { charts.pages().len() } else { 0 };
+            match places.get(first + usize::from(page)) {
                 Some(at) => [f32::from(at.x) + x, f32::from(at.y) + y, f32::from(at.layer), 1.0],
                 None => open,
             }

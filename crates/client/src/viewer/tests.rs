@@ -5,6 +5,7 @@ use std::sync::Arc;
 use dapple_gpu::testing::{block_on, gpu_for_tests};
 use dapple_gpu::{Gpu, read_texture, wgpu};
 use dapple_render::forward::Transparency;
+use dapple_scene::glam::Vec3;
 use dapple_scene::{NoFiles, PosedCamera, Scene, builtin};
 use dapple_server::{Server, ServerConfig};
 use dapple_stream::Limits;
@@ -41,6 +42,18 @@ fn camera(scene: &Scene, time_s: f64) -> PosedCamera {
 }
 
 fn picture(gpu: &Gpu, viewer: &mut Viewer, time_s: f64, now_s: f64, options: &DrawOptions) -> Vec<[u8; 4]> {
+    let camera = camera(viewer.scene(), time_s);
+    picture_from(gpu, viewer, &camera, time_s, now_s, options)
+}
+
+fn picture_from(
+    gpu: &Gpu,
+    viewer: &mut Viewer,
+    camera: &PosedCamera,
+    time_s: f64,
+    now_s: f64,
+    options: &DrawOptions,
+) -> Vec<[u8; 4]> {
     let target = gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: None,
         size: wgpu::Extent3d { width: SIZE.0, height: SIZE.1, depth_or_array_layers: 1 },
@@ -52,8 +65,7 @@ fn picture(gpu: &Gpu, viewer: &mut Viewer, time_s: f64, now_s: f64, options: &Dr
         view_formats: &[],
     });
     let view = target.create_view(&wgpu::TextureViewDescriptor::default());
-    let camera = camera(viewer.scene(), time_s);
-    viewer.draw(gpu, &view, SIZE, &camera, time_s, now_s, options).expect("it draws");
+    viewer.draw(gpu, &view, SIZE, camera, time_s, now_s, options).expect("it draws");
     let bytes = block_on(read_texture(gpu, &target, 0)).expect("it can be read");
     bytes.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect()
 }
@@ -82,8 +94,12 @@ fn compare(shown: &[[u8; 4]], twin: &[Option<f32>]) -> (f64, f64) {
 
 /// Visibility a pixel by the processor; `None` for the background.
 fn twin(client: &Client, scene: &Scene, time_s: f64) -> Vec<Option<f32>> {
+    twin_from(client, &camera(scene, time_s), time_s)
+}
+
+fn twin_from(client: &Client, camera: &PosedCamera, time_s: f64) -> Vec<Option<f32>> {
     let params = PictureParams { width: SIZE.0, height: SIZE.1, supersample: 1, shade: Default::default() };
-    let drawn = client.draw(&camera(scene, time_s), time_s, &params).expect("it draws");
+    let drawn = client.draw(camera, time_s, &params).expect("it draws");
     let visibility = client.visibility(&drawn, &Reconstruction::Atlas);
     drawn.gbuffer.samples().iter().zip(visibility).map(|(s, v)| s.is_covered().then_some(v)).collect()
 }
@@ -123,6 +139,41 @@ fn it_shows_what_the_processor_shows_after_updates_too() {
     let stats = viewer.stats();
     assert_eq!(stats.frames_received, 1 + frames);
     assert!(stats.texels > 0 && stats.memory_bytes.0 > 0 && stats.last_frame_s == Some(1.2));
+}
+
+#[test]
+fn surfaces_seen_from_both_sides_have_light_on_both() {
+    let Some(gpu) = gpu_for_tests() else { return };
+    let mut scene = (*atrium()).clone();
+    for material in &mut scene.materials {
+        material.double_sided = true;
+    }
+    let scene = Arc::new(scene);
+    let mut viewer = viewer(&gpu, &scene);
+    let mut client = Client::new(scene.clone(), Limits::default());
+    let snapshot = server(&scene, 48.0).join().expect("it can be encoded").expect("there is one");
+    viewer.receive(&snapshot.bytes, 0.0).expect("it is sound");
+    client.receive(&snapshot.bytes).expect("it is sound");
+    work_to_the_end(&mut viewer, usize::MAX);
+    let options = DrawOptions { view: DebugView::Visibility, fade_s: 0.0, ..DrawOptions::default() };
+    // From outside and below the hall shows little but backs.
+    let bounds = scene.bounds_world(&scene.pose(0.0));
+    let middle = 0.5 * (bounds.min + bounds.max);
+    let mut backs = 0;
+    for direction in [Vec3::X, Vec3::NEG_Z, Vec3::new(0.3, -1.0, 0.2)] {
+        let camera = PosedCamera::look_at(middle + direction * 0.8 * bounds.diagonal(), middle, 0.8);
+        let shown = picture_from(&gpu, &mut viewer, &camera, 0.0, 1.0, &options);
+        let (mean, off) = compare(&shown, &twin_from(&client, &camera, 0.0));
+        assert!(
+            mean < 1.0 && off < 0.03,
+            "from {direction}: mean difference {mean}, {off} of the pixels off"
+        );
+        let params =
+            PictureParams { width: SIZE.0, height: SIZE.1, supersample: 1, shade: Default::default() };
+        let drawn = client.draw(&camera, 0.0, &params).expect("it draws");
+        backs += drawn.gbuffer.samples().iter().filter(|s| s.is_back_face()).count();
+    }
+    assert!(backs > 3000, "{backs} pixels show a back");
 }
 
 #[test]

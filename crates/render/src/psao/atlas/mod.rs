@@ -137,6 +137,9 @@ enum Stage {
     },
 }
 
+/// Changes that are made together: enough to wait for memory together, few enough to stay in the nearest cache.
+const CHANGES_A_BATCH: usize = 32;
+
 /// Texels of work that other steps are worth, in parts of a weighed texel.
 const TRIANGLES_A_TEXEL: usize = 2;
 const ENCODED_A_TEXEL: usize = 16;
@@ -368,12 +371,19 @@ impl VisibilityAtlas {
     pub fn apply(&mut self, changes: impl IntoIterator<Item = PointChange>) {
         let sets = self.layout.sets();
         let mut at = 0;
+        // Changes of one set that wait to be made together.
+        let mut batch: Vec<(usize, i32)> = Vec::with_capacity(CHANGES_A_BATCH);
+        let (pages, fading) = (&mut self.pages, &mut self.fading);
         for PointChange { point, old, new } in changes {
             let difference = i32::from(new) - i32::from(old);
             let in_set = |at: usize| {
                 sets.get(at).is_some_and(|s| s.first <= point && point - s.first < s.len() as u32)
             };
             if !in_set(at) {
+                if let Some(SetState::Ready(ready)) = self.sets.get_mut(at) {
+                    ready.apply(&batch, pages, fading);
+                }
+                batch.clear();
                 // Empty sets share their first point with the one after them, which is the last of those.
                 at = sets.partition_point(|s| s.first <= point).saturating_sub(1);
                 if !in_set(at) {
@@ -383,29 +393,63 @@ impl VisibilityAtlas {
             let local = (point - sets[at].first) as usize;
             match &mut self.sets[at] {
                 SetState::Ready(ready) => {
-                    let mut walk = ready.placed.walk();
-                    let (sums, pages, fading) = (&mut ready.sums, &mut self.pages, &mut self.fading);
-                    ready.table.for_each(local, |texel, weight| {
-                        let value = sums.add(texel, weight, difference);
-                        pages.write(walk.address(texel), value, fading);
-                    });
+                    batch.push((local, difference));
+                    if batch.len() == CHANGES_A_BATCH {
+                        ready.apply(&batch, pages, fading);
+                        batch.clear();
+                    }
                 }
                 SetState::Open => {
                     if let Some(Job { set, stage: Stage::Sum { table, sums, next }, .. }) = &mut self.job
                         && *set == at
                         && local < *next
                     {
-                        table.for_each(local, |texel, weight| {
-                            sums.add(texel, weight, difference);
+                        table.for_each_run(local, |texel, weights| {
+                            sums.add(texel, weights, difference, |_| ());
                         });
                     }
                 }
             }
         }
+        if let Some(SetState::Ready(ready)) = self.sets.get_mut(at) {
+            ready.apply(&batch, pages, fading);
+        }
         // Who never begins an update must not pay for that with memory without bound.
         if self.fading.len() > self.pages.texel_count() {
             self.fading.sort_unstable();
             self.fading.dedup();
+        }
+    }
+}
+
+impl ReadySet {
+    /// Adds changes, each a point of the set and new − old value, to sums and texels.
+    ///
+    /// Changed points lie anywhere, so this waits for memory more than for anything else. It therefore reads ahead for all of them
+    /// first, so that they wait together.
+    fn apply(&mut self, changes: &[(usize, i32)], pages: &mut Pages, fading: &mut Vec<u32>) {
+        if changes.is_empty() {
+            return;
+        }
+        let mut ahead = self.table.read_ahead(changes.iter().map(|change| change.0));
+        let mut rows: Vec<(u32, u32, &[u8], i32)> = Vec::with_capacity(8 * changes.len());
+        for &(point, difference) in changes {
+            let mut walk = self.placed.walk();
+            self.table.for_each_run(point, |mut texel, mut weights| {
+                while !weights.is_empty() {
+                    let (address, left) = walk.address(texel);
+                    let (row, rest) = weights.split_at(weights.len().min(left as usize));
+                    ahead ^= self.sums.value(texel) ^ pages.all_texels()[address as usize][0];
+                    rows.push((texel, address, row, difference));
+                    (texel, weights) = (texel + left, rest);
+                }
+            });
+        }
+        // What was read ahead must not be optimised away.
+        std::hint::black_box(ahead);
+        for (texel, address, row, difference) in rows {
+            let mut texels = pages.write(address, row.len(), fading);
+            self.sums.add(texel, row, difference, |value| texels.next(value));
         }
     }
 }

@@ -31,6 +31,8 @@ const OPEN: [u8; 2] = [255, 255];
 /// Square layers of texels `[old, new]`.
 pub(super) struct Pages {
     side: u32,
+    /// Sides are powers of two.
+    side_log2: u32,
     /// Layer after layer, rows from the top. A texel's index is its *address*.
     texels: Vec<[u8; 2]>,
     /// One for each row of each layer.
@@ -43,7 +45,13 @@ impl Pages {
         let wanted = points * TEXELS_A_POINT;
         let side = if wanted <= usize::from(SIDES[0]).pow(2) { SIDES[0] } else { SIDES[1] };
         let places = Atlas::new(side, MOST_LAYERS);
-        Pages { side: u32::from(side), texels: Vec::new(), dirty: Vec::new(), places }
+        Pages {
+            side: u32::from(side),
+            side_log2: side.ilog2(),
+            texels: Vec::new(),
+            dirty: Vec::new(),
+            places,
+        }
     }
 
     pub(super) fn side(&self) -> u32 {
@@ -123,22 +131,21 @@ impl Pages {
         let texel = &mut self.texels[address as usize];
         if texel[0] != texel[1] {
             texel[0] = texel[1];
-            self.dirty[(address / self.side) as usize] = true;
+            self.dirty[(address >> self.side_log2) as usize] = true;
         }
     }
 
-    /// Gives a texel a new value. Its address joins `fading` if it did not fade before.
+    /// Gives new values to `count` texels of one row, the first at `address`. Addresses of those that did not fade before
+    /// join `fading`.
     #[inline]
-    pub(super) fn write(&mut self, address: u32, value: u8, fading: &mut Vec<u32>) {
-        let texel = &mut self.texels[address as usize];
-        if texel[1] == value {
-            return;
-        }
-        if texel[0] == texel[1] {
-            fading.push(address);
-        }
-        texel[1] = value;
-        self.dirty[(address / self.side) as usize] = true;
+    pub(super) fn write<'a>(
+        &'a mut self,
+        address: u32,
+        count: usize,
+        fading: &'a mut Vec<u32>,
+    ) -> RowWriter<'a> {
+        let texels = self.texels[address as usize..][..count].iter_mut();
+        RowWriter { texels, address, dirty: &mut self.dirty[(address >> self.side_log2) as usize], fading }
     }
 
     /// The rows that changed since the last call, joined to bands.
@@ -156,6 +163,32 @@ impl Pages {
             }
         }
         bands
+    }
+}
+
+/// Writes values to neighbouring texels.
+pub(super) struct RowWriter<'a> {
+    texels: std::slice::IterMut<'a, [u8; 2]>,
+    address: u32,
+    dirty: &'a mut bool,
+    fading: &'a mut Vec<u32>,
+}
+
+impl RowWriter<'_> {
+    /// The value of the next texel; nothing happens after the last.
+    #[inline]
+    pub(super) fn next(&mut self, value: u8) {
+        let Some(texel) = self.texels.next() else { return };
+        let address = self.address;
+        self.address += 1;
+        if texel[1] == value {
+            return;
+        }
+        if texel[0] == texel[1] {
+            self.fading.push(address);
+        }
+        texel[1] = value;
+        *self.dirty = true;
     }
 }
 
@@ -210,12 +243,12 @@ pub(super) struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// Address of a texel, which must exist.
+    /// Address of a texel, which must exist, and how many follow it up to the end of its row, itself counted.
     #[inline]
-    pub(super) fn address(&mut self, texel: u32) -> u32 {
+    pub(super) fn address(&mut self, texel: u32) -> (u32, u32) {
         let within = texel.wrapping_sub(self.first);
         if within < self.width {
-            return self.address + within;
+            return (self.address + within, self.width - within);
         }
         let pages = &self.placed.pages;
         let at = if pages.len() == 1 { 0 } else { pages.partition_point(|p| p.first_texel <= texel) - 1 };
@@ -224,7 +257,8 @@ impl Walk<'_> {
         self.first = page.first_texel + row * page.width;
         self.width = page.width;
         self.address = page.address + row * self.placed.side;
-        self.address + texel - self.first
+        let within = texel - self.first;
+        (self.address + within, self.width - within)
     }
 }
 
@@ -242,7 +276,7 @@ mod tests {
         assert_eq!(pages.take_dirty(), [DirtyBand { layer: 0, y: 0..40 }]);
         let mut fading = Vec::new();
         for (x, y, value) in [(3, 1, 9), (4, 1, 9), (3, 5, 8), (3, 30, 1), (3, 31, 7)] {
-            pages.write(pages.address(0, x, y), value, &mut fading);
+            pages.write(pages.address(0, x, y), 1, &mut fading).next(value);
         }
         assert_eq!(pages.take_dirty(), [DirtyBand { layer: 0, y: 1..6 }, DirtyBand { layer: 0, y: 30..31 }]);
         assert!(pages.take_dirty().is_empty());

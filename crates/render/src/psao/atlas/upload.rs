@@ -77,14 +77,10 @@ impl VisibilityAtlas {
         self.ready_set(instance).map(|ready| &ready.charts)
     }
 
-    /// Where each page of an instance's charts lies, for its front; empty if it is not ready.
+    /// Where each page of an instance's charts lies: for its front and then, if its mesh is seen from both sides, once more for
+    /// its back. Empty if it is not ready.
     pub fn placements(&self, instance: u32) -> &[Placement] {
-        self.ready_set(instance).map_or(&[], |ready| ready.placements_of(false))
-    }
-
-    /// Where each page lies for its back: places of its own where the mesh is seen from both sides, else those of the front.
-    pub fn back_placements(&self, instance: u32) -> &[Placement] {
-        self.ready_set(instance).map_or(&[], |ready| ready.placements_of(true))
+        self.ready_set(instance).map_or(&[], |ready| &ready.placements)
     }
 
     /// Bytes on the heap: tables, sums, texels, charts, and what is being made; not the layout, which the store owns
@@ -127,11 +123,13 @@ impl VisibilityAtlas {
             }
             for point in 0..ready.table.points() {
                 let mut walk = ready.placed.walk();
-                ready.table.for_each(point, |texel, weight| {
-                    let at = (walk.address(texel) as usize).wrapping_sub(first);
-                    if let Some(info) = infos.get_mut(at) {
-                        info.weights += 1;
-                        info.heaviest = info.heaviest.max(weight);
+                ready.table.for_each_run(point, |texel, weights| {
+                    for (texel, &weight) in (texel..).zip(weights) {
+                        let at = (walk.address(texel).0 as usize).wrapping_sub(first);
+                        if let Some(info) = infos.get_mut(at) {
+                            info.weights += 1;
+                            info.heaviest = info.heaviest.max(u16::from(weight) + 1);
+                        }
                     }
                 });
             }
