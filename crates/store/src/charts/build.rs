@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::flatten::Flat;
-use super::grow::{GrowParams, grow_all};
+use super::grow::{GrowParams, Growth, Grown};
 use super::pack::{Packed, pack};
 use super::per_vertex::vertex_pages;
 use super::set::{Chart, ChartError, ChartParams, ChartUv, MOST_TEXELS, PageSize};
@@ -30,39 +30,79 @@ pub(super) struct Layout {
     pub(super) texel: f64,
 }
 
-/// Makes the charts. `params` and indices are checked.
-pub(super) fn lay_out(
-    positions: &[Vec3],
-    triangles: &[[u32; 3]],
-    params: &ChartParams,
-) -> Result<Layout, ChartError> {
-    if triangles.is_empty() {
-        return Ok(Layout::default());
+/// Makes the charts of a mesh a piece at a time.
+#[derive(Debug)]
+pub(super) struct LayoutBuilder {
+    surface: Surface,
+    params: ChartParams,
+    vertices: usize,
+    triangles: Vec<[u32; 3]>,
+    texel: f64,
+    tries: usize,
+    growth: Growth,
+}
+
+impl LayoutBuilder {
+    /// `params` and indices are checked.
+    pub(super) fn new(positions: &[Vec3], triangles: &[[u32; 3]], params: &ChartParams) -> LayoutBuilder {
+        let surface = Surface::new(positions, triangles);
+        let texel = first_texel(&surface, params);
+        let growth = Growth::new(&surface, grow_params(params, texel));
+        let (params, vertices, triangles) = (*params, positions.len(), triangles.to_vec());
+        LayoutBuilder { surface, params, vertices, triangles, texel, tries: 0, growth }
     }
-    let surface = Surface::new(positions, triangles);
-    let mut texel = first_texel(&surface, params);
-    let mut pieces = 0;
-    for _ in 0..MOST_TRIES {
-        let params =
-            GrowParams { texel, least_cosine: f64::from(params.least_cosine), max_side: params.max_side };
-        let flat = Flattened::new(&surface, params);
+
+    /// Goes on until about `budget` triangles and texels were looked at; gives how many were, and what came out once all
+    /// is done. Call it no more after that.
+    pub(super) fn work(&mut self, budget: usize) -> (usize, Option<Result<Layout, ChartError>>) {
+        if self.triangles.is_empty() {
+            return (0, Some(Ok(Layout::default())));
+        }
+        let mut spent = self.growth.work(&self.surface, budget);
+        if !self.growth.is_complete() {
+            return (spent, None);
+        }
+        spent += self.triangles.len();
+        let flat = Flattened::new(&self.surface, self.growth.take_charts(), self.texel);
         let sizes: Vec<[u16; 2]> = flat.charts.iter().map(|c| c.size).collect();
-        let packed = pack(&sizes, params.max_side);
+        let packed = pack(&sizes, self.params.max_side);
         let count = packed.texel_count();
-        if is_fine(&surface, texel) {
+        if is_fine(&self.surface, self.texel) {
             let fewer = count.saturating_sub(1).min(u64::from(MOST_TEXELS));
-            if let Some(found) = vertex_pages(&surface, positions.len(), triangles, params.max_side, fewer) {
-                let (pages, corners) = (found.pages, found.corners);
-                return Ok(Layout { pages, corners, per_vertex: true, texel, ..Layout::default() });
+            let found =
+                vertex_pages(&self.surface, self.vertices, &self.triangles, self.params.max_side, fewer);
+            if let Some(found) = found {
+                let (pages, corners, texel) = (found.pages, found.corners, self.texel);
+                let layout = Layout { pages, corners, per_vertex: true, texel, ..Layout::default() };
+                return (spent, Some(Ok(layout)));
             }
         }
         if count <= u64::from(MOST_TEXELS) {
-            return Ok(flat.place(&surface, packed, texel));
+            return (spent, Some(Ok(flat.place(&self.surface, packed, self.texel))));
         }
-        pieces = flat.charts.len();
-        texel *= (count as f64 / f64::from(MOST_TEXELS)).sqrt().clamp(1.1, 64.0) * 1.02;
+        self.tries += 1;
+        if self.tries == MOST_TRIES {
+            let (charts, limit) = (flat.charts.len(), MOST_TEXELS);
+            return (spent, Some(Err(ChartError::TooManyPieces { charts, limit })));
+        }
+        self.texel *= (count as f64 / f64::from(MOST_TEXELS)).sqrt().clamp(1.1, 64.0) * 1.02;
+        self.growth = Growth::new(&self.surface, self.grow_params());
+        (spent, None)
     }
-    Err(ChartError::TooManyPieces { charts: pieces, limit: MOST_TEXELS })
+
+    /// Part of the work that is left, 0 … 1, as far as can be told.
+    pub(super) fn left(&self) -> f64 {
+        let (left, all) = self.growth.seeds();
+        left as f64 / all.max(1) as f64
+    }
+
+    fn grow_params(&self) -> GrowParams {
+        grow_params(&self.params, self.texel)
+    }
+}
+
+fn grow_params(params: &ChartParams, texel: f64) -> GrowParams {
+    GrowParams { texel, least_cosine: f64::from(params.least_cosine), max_side: params.max_side }
 }
 
 /// The texel edge asked for, or a coarser one where area or slivers rule it out from the start.
@@ -103,8 +143,7 @@ struct Flattened {
 }
 
 impl Flattened {
-    fn new(surface: &Surface, params: GrowParams) -> Flattened {
-        let grown = grow_all(surface, params);
+    fn new(surface: &Surface, grown: Vec<(Grown, Flat)>, texel: f64) -> Flattened {
         let mut charts: Vec<Flat> = grown.iter().map(|c| c.1).collect();
         let count = surface.corners.len();
         let mut chart_of = vec![NONE; count];
@@ -132,7 +171,7 @@ impl Flattened {
             chart_of[t] = match at {
                 Some(at) => chart_at[at as usize],
                 None => *lone.get_or_insert_with(|| {
-                    charts.push(Flat::single(place, params.texel));
+                    charts.push(Flat::single(place, texel));
                     charts.len() as u32 - 1
                 }),
             };

@@ -73,41 +73,78 @@ pub(super) struct Grown {
     pub(super) texel: f64,
 }
 
-/// Cuts the whole surface into charts, in order of their seeds: largest triangle first. Triangles without area and
+/// Cuts a whole surface into charts, in order of their seeds: largest triangle first. Triangles without area and
 /// repeated ones are left out.
-pub(super) fn grow_all(surface: &Surface, params: GrowParams) -> Vec<(Grown, Flat)> {
-    let mut seeds: Vec<u32> = (0..surface.corners.len() as u32)
-        .filter(|&t| !surface.is_degenerate(t as usize) && surface.repeats[t as usize] == NONE)
-        .collect();
-    // Areas are positive, so their bits are in order.
-    seeds.sort_unstable_by_key(|&t| (std::cmp::Reverse(surface.double_areas[t as usize].to_bits()), t));
-    let mut grower = Grower {
-        surface,
-        params,
-        steepness: (1.0 - params.least_cosine * params.least_cosine).max(0.0).sqrt() / params.least_cosine,
-        taken: vec![false; surface.corners.len()],
-        seen: vec![0; surface.corners.len()],
-        stamp: 0,
-        cells: Cells::new(),
-        dropped: 0,
-        most_dropped: MOST_DROPPED * surface.corners.len(),
-    };
-    let mut charts = Vec::new();
-    for seed in seeds {
-        if !grower.taken[seed as usize] {
-            let chart = grower.grow_best(seed);
-            let chart = grower.settle(chart);
-            for &t in &chart.0.triangles {
-                grower.taken[t as usize] = true;
-            }
-            charts.push(chart);
-        }
-    }
-    charts
+#[derive(Debug)]
+pub(super) struct Growth {
+    grower: Grower,
+    seeds: Vec<u32>,
+    next_seed: usize,
+    charts: Vec<(Grown, Flat)>,
 }
 
-struct Grower<'s> {
-    surface: &'s Surface,
+impl Growth {
+    /// `surface` is to be the same in all calls.
+    pub(super) fn new(surface: &Surface, params: GrowParams) -> Growth {
+        let mut seeds: Vec<u32> = (0..surface.corners.len() as u32)
+            .filter(|&t| !surface.is_degenerate(t as usize) && surface.repeats[t as usize] == NONE)
+            .collect();
+        // Areas are positive, so their bits are in order.
+        seeds.sort_unstable_by_key(|&t| (std::cmp::Reverse(surface.double_areas[t as usize].to_bits()), t));
+        let grower = Grower {
+            params,
+            steepness: (1.0 - params.least_cosine * params.least_cosine).max(0.0).sqrt()
+                / params.least_cosine,
+            taken: vec![false; surface.corners.len()],
+            seen: vec![0; surface.corners.len()],
+            stamp: 0,
+            cells: Cells::new(),
+            dropped: 0,
+            most_dropped: MOST_DROPPED * surface.corners.len(),
+            visits: 0,
+        };
+        Growth { grower, seeds, next_seed: 0, charts: Vec::new() }
+    }
+
+    /// Goes on until about `budget` triangles and texels were looked at (one chart at least); gives how many were. Charts are
+    /// the same however the work is cut.
+    pub(super) fn work(&mut self, surface: &Surface, budget: usize) -> usize {
+        let before = self.grower.visits;
+        while let Some(&seed) = self.seeds.get(self.next_seed) {
+            if self.grower.visits - before >= budget {
+                break;
+            }
+            self.next_seed += 1;
+            self.grower.visits += 1;
+            if !self.grower.taken[seed as usize] {
+                let chart = self.grower.grow_best(surface, seed);
+                let chart = self.grower.settle(surface, chart);
+                for &t in &chart.0.triangles {
+                    self.grower.taken[t as usize] = true;
+                }
+                self.charts.push(chart);
+            }
+        }
+        self.grower.visits - before
+    }
+
+    pub(super) fn is_complete(&self) -> bool {
+        self.next_seed == self.seeds.len()
+    }
+
+    /// Seeds that are left, and of how many.
+    pub(super) fn seeds(&self) -> (usize, usize) {
+        (self.seeds.len() - self.next_seed, self.seeds.len())
+    }
+
+    /// The charts so far; all of them once growth is complete.
+    pub(super) fn take_charts(&mut self) -> Vec<(Grown, Flat)> {
+        std::mem::take(&mut self.charts)
+    }
+}
+
+#[derive(Debug)]
+struct Grower {
     params: GrowParams,
     /// Tangent of the cone's half angle: how steep a chart may be.
     steepness: f64,
@@ -119,27 +156,28 @@ struct Grower<'s> {
     /// Triangles dropped from charts so far, and when to stop, which bounds the time taken.
     dropped: usize,
     most_dropped: usize,
+    /// Triangles and texels looked at so far.
+    visits: usize,
 }
 
-impl Grower<'_> {
+impl Grower {
     /// Grows about the seed's normal to learn the mean normal, then about that. Keeps the first if the second came out at
     /// less than half its size, which also bounds the time spent on what is not kept.
-    fn grow_best(&mut self, seed: u32) -> Grown {
-        let seed_normal = self.surface.normals[seed as usize];
-        let first = self.grow(seed, seed_normal);
+    fn grow_best(&mut self, surface: &Surface, seed: u32) -> Grown {
+        let seed_normal = surface.normals[seed as usize];
+        let first = self.grow(surface, seed, seed_normal);
         let sum: DVec3 = first.triangles.iter().fold(DVec3::ZERO, |sum, &t| {
-            sum + self.surface.normals[t as usize] * self.surface.double_areas[t as usize]
+            sum + surface.normals[t as usize] * surface.double_areas[t as usize]
         });
         let mean = sum / sum.length();
         if !mean.is_finite() || mean.dot(seed_normal) > SAME_AXIS {
             return first;
         }
-        let second = self.grow(seed, mean);
+        let second = self.grow(surface, seed, mean);
         if second.triangles.len() * 2 < first.triangles.len() { first } else { second }
     }
 
-    fn grow(&mut self, seed: u32, normal: DVec3) -> Grown {
-        let surface = self.surface;
+    fn grow(&mut self, surface: &Surface, seed: u32, normal: DVec3) -> Grown {
         let frame = Frame::with_normal(surface.corner_places(seed as usize)[0], normal);
         let corners = surface.corner_places(seed as usize).map(|p| frame.project(p));
         let [mut low, mut high] = bounds(corners);
@@ -150,7 +188,7 @@ impl Grower<'_> {
         self.cells.clear();
         let mut triangles = vec![seed];
         self.seen[seed as usize] = self.stamp;
-        self.claim_cells(seed, corners, &frame, texel);
+        self.claim_cells(surface, seed, corners, &frame, texel);
         let mut next = 0;
         while next < triangles.len() {
             for neighbour in surface.neighbours[triangles[next] as usize] {
@@ -166,7 +204,7 @@ impl Grower<'_> {
                 let [own_low, own_high] = bounds(corners);
                 let (new_low, new_high) = (low.min(own_low), high.max(own_high));
                 if (new_high - new_low).max_element() > longest
-                    || !self.claim_cells(neighbour, corners, &frame, texel)
+                    || !self.claim_cells(surface, neighbour, corners, &frame, texel)
                 {
                     continue;
                 }
@@ -180,8 +218,15 @@ impl Grower<'_> {
 
     /// Takes the cells under a triangle, of [`GROWTH_CELL`] texels a side, in the frame that a chart grows in. Tells
     /// layers apart at little cost; [`Grower::settle`] looks closer.
-    fn claim_cells(&mut self, triangle: u32, corners: [DVec3; 3], frame: &Frame, texel: f64) -> bool {
-        let normal = self.surface.normals[triangle as usize];
+    fn claim_cells(
+        &mut self,
+        surface: &Surface,
+        triangle: u32,
+        corners: [DVec3; 3],
+        frame: &Frame,
+        texel: f64,
+    ) -> bool {
+        let normal = surface.normals[triangle as usize];
         let normal = DVec3::from_array(frame.axes.map(|axis| axis.dot(normal)));
         let cell = GROWTH_CELL * texel;
         let claim = Claim { step: DVec2::splat(cell), reach: 0.5, range: f64::INFINITY, texel };
@@ -199,9 +244,11 @@ impl Grower<'_> {
         let slope = -normal.truncate() * step / normal.z;
         let height_at = |p: DVec2| corners[0].z + slope.dot(p - corners[0].truncate());
         self.cells.begin();
-        let cells = &mut self.cells;
+        let (cells, visits) = (&mut self.cells, &mut self.visits);
+        *visits += 1;
         let steepness_squared = self.steepness * self.steepness;
         let fits = touched(corners.map(|c| c.truncate()), reach, |x, y, closest| {
+            *visits += 1;
             let height = height_at(closest);
             let over_centre = height_at(DVec2::new(f64::from(x), f64::from(y)));
             let Some(slot) = cells.find_or_insert((x, y), Cell { closest, height, range: [over_centre; 2] })
@@ -226,17 +273,17 @@ impl Grower<'_> {
     }
 
     /// Lays a chart flat, and drops from it the triangles that the turned grid brings over others.
-    fn settle(&mut self, mut chart: Grown) -> (Grown, Flat) {
-        let flat = flatten(self.surface, &chart, self.params.max_side);
+    fn settle(&mut self, surface: &Surface, mut chart: Grown) -> (Grown, Flat) {
+        let flat = flatten(surface, &chart, self.params.max_side);
         self.cells.clear();
         let before = chart.triangles.len();
         let claim =
             Claim { step: flat.step, reach: 1.0, range: MOST_RANGE * chart.texel, texel: chart.texel };
         let mut triangles = std::mem::take(&mut chart.triangles);
         triangles.retain(|&t| {
-            let normal = self.surface.normals[t as usize];
+            let normal = surface.normals[t as usize];
             let normal = DVec3::from_array(flat.frame.axes.map(|axis| axis.dot(normal)));
-            let corners = self.surface.corner_places(t as usize).map(|place| {
+            let corners = surface.corner_places(t as usize).map(|place| {
                 let [x, y] = flat.snapped_texel_of(place);
                 let offset = DVec2::new(f64::from(x), f64::from(y)) / f64::from(TEXEL_FRACTION) - 0.5;
                 offset.extend(flat.frame.project(place).z)
@@ -278,6 +325,7 @@ struct Cell {
 }
 
 /// Cells by texel: open addressing, emptied in no time by a new generation.
+#[derive(Debug)]
 struct Cells {
     /// Generation and texel of each slot; a slot of another generation is free.
     keys: Vec<(u32, (i32, i32))>,

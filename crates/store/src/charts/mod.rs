@@ -27,7 +27,8 @@ pub use cuts::{Cuts, CutsError, SetCuts, SiteCut, fingerprint};
 pub use kernel::{Fit, MovingLeastSquares, Weighed};
 pub use plan::{InstanceKey, SceneCharts};
 pub use set::{
-    ChartError, ChartParams, ChartSet, ChartUv, ChartVertices, MOST_TEXELS, PageSize, Site, TEXEL_FRACTION,
+    ChartBuilder, ChartError, ChartParams, ChartSet, ChartUv, ChartVertices, MOST_TEXELS, PageSize, Site,
+    TEXEL_FRACTION,
 };
 pub use sides::add_back_sites;
 pub use weights::{

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::build::{Layout, lay_out};
+use super::build::{Layout, LayoutBuilder};
 use super::flatten::Flat;
 use super::per_vertex::vertex_sites;
 use super::raster::touched;
@@ -165,6 +165,53 @@ pub struct ChartSet {
     lone: Option<u32>,
 }
 
+/// Makes the charts of a mesh a piece at a time, where a thread must not be held up: the same charts as
+/// [`ChartSet::new`], to the bit.
+#[derive(Debug)]
+pub struct ChartBuilder {
+    layout: LayoutBuilder,
+    mirrored: bool,
+}
+
+impl ChartBuilder {
+    /// Takes in the mesh: the one step, linear in its triangles, that is not cut in pieces.
+    ///
+    /// # Errors
+    ///
+    /// A parameter out of range, a triangle that names a vertex which is not there.
+    pub fn new(
+        positions_rest: &[Vec3],
+        triangles: &[[u32; 3]],
+        params: &ChartParams,
+    ) -> Result<ChartBuilder, ChartError> {
+        params.check()?;
+        let count = positions_rest.len();
+        for (triangle, corners) in triangles.iter().enumerate() {
+            if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= count) {
+                return Err(ChartError::BadVertex { triangle, vertex, count });
+            }
+        }
+        let layout = LayoutBuilder::new(positions_rest, triangles, params);
+        Ok(ChartBuilder { layout, mirrored: params.mirrored })
+    }
+
+    /// Goes on until about `budget` triangles and texels were looked at (at least one chart is grown); gives how many were,
+    /// and the charts once they are done. Call it no more after that.
+    ///
+    /// # Errors
+    ///
+    /// More than [`MOST_TEXELS`] loose pieces.
+    pub fn work(&mut self, budget: usize) -> Result<(usize, Option<ChartSet>), ChartError> {
+        let (spent, layout) = self.layout.work(budget);
+        Ok((spent, layout.transpose()?.map(|layout| ChartSet::of_layout(layout, self.mirrored))))
+    }
+
+    /// Part of the work that is left, 0 … 1, as far as can be told.
+    pub fn left(&self) -> f64 {
+        self.layout.left()
+    }
+}
+
 /// A chart in its page.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Chart {
@@ -202,21 +249,22 @@ impl ChartSet {
         triangles: &[[u32; 3]],
         params: &ChartParams,
     ) -> Result<ChartSet, ChartError> {
-        params.check()?;
-        let count = positions_rest.len();
-        for (triangle, corners) in triangles.iter().enumerate() {
-            if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= count) {
-                return Err(ChartError::BadVertex { triangle, vertex, count });
+        let mut builder = ChartBuilder::new(positions_rest, triangles, params)?;
+        loop {
+            if let (_, Some(charts)) = builder.work(usize::MAX)? {
+                return Ok(charts);
             }
         }
-        let Layout { pages, per_vertex, corners, chart_of, charts, lone, texel } =
-            lay_out(positions_rest, triangles, params)?;
+    }
+
+    fn of_layout(layout: Layout, mirrored: bool) -> ChartSet {
+        let Layout { pages, per_vertex, corners, chart_of, charts, lone, texel } = layout;
         let mut first_texels = vec![0u32];
         for page in &pages {
             first_texels.push(first_texels[first_texels.len() - 1] + page.area());
         }
-        let (mirrored, texel_m) = (params.mirrored, texel as f32);
-        Ok(ChartSet { pages, first_texels, per_vertex, mirrored, texel_m, corners, chart_of, charts, lone })
+        let texel_m = texel as f32;
+        ChartSet { pages, first_texels, per_vertex, mirrored, texel_m, corners, chart_of, charts, lone }
     }
 
     /// Sizes of the pages.

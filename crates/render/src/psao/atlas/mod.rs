@@ -14,8 +14,8 @@ use std::sync::Arc;
 
 use dapple_scene::Scene;
 use dapple_store::charts::{
-    AtlasError, ChartError, ChartParams, ChartSet, Cuts, InstanceKey, PointNeighbours, WeightParams,
-    add_back_sites,
+    AtlasError, ChartBuilder, ChartError, ChartParams, ChartSet, Cuts, InstanceKey, PointNeighbours,
+    WeightParams, add_back_sites,
 };
 use dapple_store::points::PointLayout;
 
@@ -120,12 +120,14 @@ struct ReadySet {
 /// The set that is being made.
 struct Job {
     set: usize,
+    /// Empty until they are made.
     charts: Arc<ChartSet>,
     charts_key: InstanceKey,
     stage: Stage,
 }
 
 enum Stage {
+    Charts(Box<ChartBuilder>),
     Sites,
     Weigh(Box<Builder>),
     Encode(Box<Builder>),
@@ -141,7 +143,9 @@ enum Stage {
 const CHANGES_A_BATCH: usize = 32;
 
 /// Texels of work that other steps are worth, in parts of a weighed texel.
-const TRIANGLES_A_TEXEL: usize = 2;
+const TRIANGLES_A_TEXEL: usize = 8;
+const VISITS_A_TEXEL: usize = 32;
+const SITES_A_TEXEL: usize = 8;
 const ENCODED_A_TEXEL: usize = 16;
 const SUMMED_A_TEXEL: usize = 16;
 
@@ -218,6 +222,7 @@ impl VisibilityAtlas {
             let points = sets[job.set].len();
             let texels = job.charts.texel_count() as usize;
             match &job.stage {
+                Stage::Charts(builder) => (builder.left() * points as f64) as usize + 3 * points + 1,
                 Stage::Sites => texels + 1,
                 Stage::Weigh(b) => b.sites() - b.weighed() + b.sites() / ENCODED_A_TEXEL + 1,
                 Stage::Encode(b) => (b.sites() - b.encoded()) / ENCODED_A_TEXEL + 1,
@@ -227,7 +232,7 @@ impl VisibilityAtlas {
         Progress { done: self.done, total: self.done + (waiting + job) as u64 }
     }
 
-    /// Makes the charts of a set, or takes those of an instance with the same.
+    /// Begins to make the charts of a set, or takes those of an instance with the same.
     fn begin(&mut self, scene: &Scene, set: usize) -> (Option<Job>, usize) {
         let instance_index = self.layout.sets()[set].instance;
         let instance = &scene.instances[instance_index as usize];
@@ -242,24 +247,21 @@ impl VisibilityAtlas {
             SetState::Ready(ready) if ready.charts_key == key => Some(ready.charts.clone()),
             _ => None,
         });
-        let cost = if same.is_some() { 1 } else { mesh.triangles.len() / TRIANGLES_A_TEXEL + 1 };
-        let charts = match same {
-            Some(charts) => charts,
-            None => {
-                match ChartSet::new(
-                    &key.positions_rest(&mesh.positions),
-                    &mesh.triangles,
-                    &key.params(&defaults),
-                ) {
-                    Ok(charts) => Arc::new(charts),
-                    Err(error) => {
-                        self.failed.push((instance_index, error.into()));
-                        return (None, cost);
-                    }
-                }
+        if let Some(charts) = same {
+            return (Some(Job { set, charts, charts_key: key, stage: Stage::Sites }), 1);
+        }
+        let cost = mesh.triangles.len() / TRIANGLES_A_TEXEL + 1;
+        let positions_rest = key.positions_rest(&mesh.positions);
+        match ChartBuilder::new(&positions_rest, &mesh.triangles, &key.params(&defaults)) {
+            Ok(builder) => {
+                let stage = Stage::Charts(Box::new(builder));
+                (Some(Job { set, charts: Arc::default(), charts_key: key, stage }), cost)
             }
-        };
-        (Some(Job { set, charts, charts_key: key, stage: Stage::Sites }), cost)
+            Err(error) => {
+                self.failed.push((instance_index, error.into()));
+                (None, cost)
+            }
+        }
     }
 
     /// One step of a job, at most `budget` texels of it where it can be cut; gives what it cost.
@@ -269,6 +271,22 @@ impl VisibilityAtlas {
         let mut job = job;
         let cost;
         job.stage = match job.stage {
+            Stage::Charts(mut builder) => match builder.work(budget.saturating_mul(VISITS_A_TEXEL)) {
+                Ok((visits, charts)) => {
+                    cost = visits / VISITS_A_TEXEL;
+                    match charts {
+                        Some(charts) => {
+                            job.charts = Arc::new(charts);
+                            Stage::Sites
+                        }
+                        None => Stage::Charts(builder),
+                    }
+                }
+                Err(error) => {
+                    self.failed.push((set.instance, error.into()));
+                    return 1;
+                }
+            },
             Stage::Sites => {
                 let mesh = &scene.meshes[scene.instances[set.instance as usize].mesh as usize];
                 let positions_rest = job.charts_key.positions_rest(&mesh.positions);
@@ -279,7 +297,7 @@ impl VisibilityAtlas {
                     texels *= 2;
                 }
                 let neighbours = PointNeighbours::new(&layout, set, &self.params.weights);
-                cost = sites.len() / 4 + mesh.triangles.len() / 4;
+                cost = sites.len() / SITES_A_TEXEL + mesh.triangles.len() / TRIANGLES_A_TEXEL;
                 let cuts = self.cuts.as_ref().and_then(|cuts| cuts.for_sites(set.instance, &sites));
                 let cuts = cuts.map_or(Vec::new(), |set| set.cuts.clone());
                 Stage::Weigh(Box::new(Builder::new(neighbours, set, sites, cuts, texels)))
@@ -457,7 +475,7 @@ impl ReadySet {
 impl Job {
     fn memory_bytes(&self) -> u64 {
         let stage = match &self.stage {
-            Stage::Sites => 0,
+            Stage::Charts(_) | Stage::Sites => 0,
             Stage::Weigh(builder) | Stage::Encode(builder) => builder.bytes(),
             Stage::Sum { table, sums, .. } => table.bytes() + sums.bytes(),
         };
