@@ -77,6 +77,7 @@ function onStats(stats) {
   byId("age").textContent = stats.age === null ? "–" : age(stats.age);
   byId("backend").textContent = stats.backend === "webgpu" ? "WebGPU" : "WebGL2";
   showTime(stats);
+  if (viewer) followCamera();
 }
 
 function age(seconds) {
@@ -135,7 +136,7 @@ function setCamera() {
   else viewer.setCamera(camera.value);
 }
 
-// A hand on the picture takes over from a path.
+// A hand on the picture takes over from a path, and so may another script of the page.
 function followCamera() {
   const { path, walking } = viewer.getCamera();
   const now = path ?? (walking ? " walk" : " orbit");
