@@ -67,7 +67,7 @@ class Viewer {
     try {
       this.#core = await Core.open(this.#canvas, backend);
     } catch (error) {
-      throw new NoGraphicsError(error.message ?? String(error));
+      throw error.name === "NoGraphics" ? new NoGraphicsError(error.message) : error;
     }
     const url = new URL(scene, document.baseURI);
     const bytes = await fetchBytes(url, this.#abort.signal, (loaded, total) => this.#progress("scene", loaded, total));

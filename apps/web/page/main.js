@@ -36,8 +36,8 @@ async function settings() {
     const response = await fetch("viewer.json").catch(() => null);
     if (!response?.ok) {
       throw new Error(
-        "Nothing to show was named. Open this page with ?scene=FILE.glb&stream=FILE.dapple, or put a viewer.json with " +
-          'those two names beside it: {"scene": "FILE.glb", "stream": "FILE.dapple"}.',
+        "Nothing to show was named. Open this page with\n?scene=FILE.glb&stream=FILE.dapple\n" +
+          'or put a viewer.json with those two names beside it:\n{"scene": "FILE.glb", "stream": "FILE.dapple"}',
       );
     }
     try {
