@@ -62,10 +62,8 @@ fn run(task: Task) -> Result<()> {
         Task::Wasm => runner.run(&[Step::Page]),
         Task::Ci => {
             runner.run(&check);
-            // Tests open the page in a browser, where that is asked for: both take minutes.
-            if std::env::var_os("REQUIRE_BROWSER").is_none_or(|value| value != "1") {
-                runner.skip("skipped: the page, set REQUIRE_BROWSER=1 to build and open it");
-            } else if wasm::has_target() {
+            // Before the tests, which open it in a browser.
+            if wasm::has_target() {
                 runner.run(&[Step::Page]);
             } else {
                 runner.skip("skipped: the page, Rust cannot compile for browsers here");

@@ -39,11 +39,14 @@ class Viewer {
   #detach = [];
   #settled = 0;
   #working = false;
+  // A message to itself comes at once, a timer after 4 ms: half as much again as the work before it.
+  #later = new MessageChannel();
 
   constructor(canvas, options, progress) {
     this.#canvas = canvas;
     this.#options = options;
     this.#progress = progress;
+    this.#later.port1.onmessage = () => this.#workOn();
     // Whoever does not wait for it still learns of errors by onError.
     this.#ready.promise.catch(() => {});
   }
@@ -64,7 +67,7 @@ class Viewer {
     try {
       this.#core = await Core.open(this.#canvas, backend);
     } catch (error) {
-      throw new NoGraphicsError(error.message ?? String(error));
+      throw error.name === "NoGraphics" ? new NoGraphicsError(error.message) : error;
     }
     const url = new URL(scene, document.baseURI);
     const bytes = await fetchBytes(url, this.#abort.signal, (loaded, total) => this.#progress("scene", loaded, total));
@@ -185,7 +188,7 @@ class Viewer {
         if (after - start > SLICE_MS) break;
         before = after;
       }
-      setTimeout(this.#workOn);
+      this.#later.port2.postMessage(null);
     } catch (error) {
       this.#fail(error instanceof Error ? error : new Error(String(error)));
     }
@@ -317,6 +320,7 @@ class Viewer {
 
   dispose() {
     this.#abort.abort();
+    this.#later.port1.close();
     for (const detach of this.#detach.splice(0)) detach();
     const core = this.#core;
     this.#core = null;

@@ -36,8 +36,8 @@ async function settings() {
     const response = await fetch("viewer.json").catch(() => null);
     if (!response?.ok) {
       throw new Error(
-        "Nothing to show was named. Open this page with ?scene=FILE.glb&stream=FILE.dapple, or put a viewer.json with " +
-          'those two names beside it: {"scene": "FILE.glb", "stream": "FILE.dapple"}.',
+        "Nothing to show was named. Open this page with\n?scene=FILE.glb&stream=FILE.dapple\n" +
+          'or put a viewer.json with those two names beside it:\n{"scene": "FILE.glb", "stream": "FILE.dapple"}',
       );
     }
     try {
@@ -77,6 +77,7 @@ function onStats(stats) {
   byId("age").textContent = stats.age === null ? "–" : age(stats.age);
   byId("backend").textContent = stats.backend === "webgpu" ? "WebGPU" : "WebGL2";
   showTime(stats);
+  if (viewer) followCamera();
 }
 
 function age(seconds) {
@@ -135,7 +136,7 @@ function setCamera() {
   else viewer.setCamera(camera.value);
 }
 
-// A hand on the picture takes over from a path.
+// A hand on the picture takes over from a path, and so may another script of the page.
 function followCamera() {
   const { path, walking } = viewer.getCamera();
   const now = path ?? (walking ? " walk" : " orbit");

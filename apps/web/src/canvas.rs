@@ -31,7 +31,12 @@ impl Screen {
                     Ok(gpu) => return Screen::configure(gpu, surface, &canvas),
                     Err(error) => reasons.push(format!("WebGL2: {error}")),
                 },
-                Err(error) => reasons.push(format!("WebGL2: {error}")),
+                // All that can be in the way of a fresh canvas; wgpu's message is for programmers.
+                Err(_) => {
+                    reasons.push(
+                        "WebGL2: this browser does not offer it, or has no graphics card for it".to_owned(),
+                    );
+                }
             }
         }
         Err(reasons.join("; "))

@@ -18,6 +18,8 @@ use crate::steer::Steering;
 
 /// Seconds that are still drawn after the last change, for whatever settles late.
 const LINGER_S: f64 = 0.3;
+/// Seconds between two pictures while nothing changes but how much light is laid out: each takes time from that work.
+const LOADING_PICTURE_S: f64 = 0.25;
 
 /// A viewer on a canvas. Not for pages: `createViewer` of `dapple.js` wraps it.
 #[wasm_bindgen]
@@ -32,6 +34,9 @@ pub struct Core {
     options: DrawOptions,
     pub(crate) steering: Steering,
     progress: LoadProgress,
+    /// Whether light was laid out that no picture shows yet, and when the last picture was drawn.
+    has_new_light: bool,
+    drawn_s: f64,
     /// Clock of the page up to which pictures are drawn.
     draw_until_s: f64,
     pub(crate) changed: bool,
@@ -48,11 +53,16 @@ struct Shown {
 
 #[wasm_bindgen]
 impl Core {
-    /// Takes a canvas, by `auto`, `webgpu` or `webgl2`.
-    pub async fn open(canvas: HtmlCanvasElement, backend: &str) -> Result<Core, JsError> {
+    /// Takes a canvas, by `auto`, `webgpu` or `webgl2`. Where the browser has none of them, the error is called
+    /// `NoGraphics`.
+    pub async fn open(canvas: HtmlCanvasElement, backend: &str) -> Result<Core, JsValue> {
         console_error_panic_hook::set_once();
-        let backend = names::backend(backend)?;
-        let screen = Screen::open(canvas, backend).await.map_err(|reason| JsError::new(&reason))?;
+        let backend = names::backend(backend).map_err(JsError::from)?;
+        let screen = Screen::open(canvas, backend).await.map_err(|reason| {
+            let error = js_sys::Error::new(&reason);
+            error.set_name("NoGraphics");
+            error
+        })?;
         let limits = Limits::default();
         Ok(Core {
             screen,
@@ -65,6 +75,8 @@ impl Core {
             options: DrawOptions::default(),
             steering: Steering::default(),
             progress: LoadProgress::default(),
+            has_new_light: false,
+            drawn_s: f64::NEG_INFINITY,
             draw_until_s: 0.0,
             changed: true,
             bytes: Rate::default(),
@@ -128,7 +140,7 @@ impl Core {
         if let Some(shown) = &mut self.shown {
             let before = self.progress;
             self.progress = shown.viewer.work(texels as usize);
-            self.changed |= self.progress != before;
+            self.has_new_light |= self.progress != before;
         }
         let LoadProgress { done, total } = self.progress;
         object(&[("done", (done as f64).into()), ("total", (total as f64).into())])
@@ -152,10 +164,13 @@ impl Core {
             self.changed = true;
         }
         self.changed |= self.steering.advance(elapsed_s);
+        // The last of it fades in.
+        self.changed |= self.has_new_light && self.progress.is_complete();
         if self.changed {
             self.draw_until_s = now_s + LINGER_S + f64::from(self.options.fade_s);
         }
-        if now_s > self.draw_until_s && self.options.view != DebugView::Age {
+        let shows_light = self.has_new_light && now_s - self.drawn_s >= LOADING_PICTURE_S;
+        if now_s > self.draw_until_s && self.options.view != DebugView::Age && !shows_light {
             return Ok(false);
         }
         let camera = self.steering.camera(scene, self.clock.time_s());
@@ -166,6 +181,7 @@ impl Core {
         self.changed = false;
         if drew.map_err(|reason| JsError::new(&reason))? {
             self.pictures.add(now_s, 1.0);
+            (self.has_new_light, self.drawn_s) = (false, now_s);
             return Ok(true);
         }
         Ok(false)

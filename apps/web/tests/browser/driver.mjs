@@ -1,10 +1,12 @@
 // Serves the page on this machine, opens it in a browser, and reports what each page showed.
 //
 // node driver.mjs PLAN.json, where the plan is
-//   { browser, page, data, out, flags, pages: [{ name, query, width, height, phone?, script?, shot?, expectMessage? }] }
-// `page` and `data` are folders served as / and /data/. Each page is opened with its query and waited for; `script`
-// is the body of an async function of the viewer, run then; the viewer's picture goes to out/NAME.png, the whole window
-// to out/NAME-window.png where `shot` is set. A JSON array of { name, errors, message, stats, result } is printed.
+//   { browser, page, data, out, flags,
+//     pages: [{ name, query, width, height, phone?, light?, scripts?: [{ name, script }], window?, expectMessage? }] }
+// `page` and `data` are folders served as / and /data/. Each page is opened with its query and waited for; then its
+// scripts are run, one after the other: each is the body of an async function of the viewer, after which the viewer's
+// picture goes to out/SCRIPT.png. The whole window goes to out/PAGE.png where `window` is set. A JSON array of
+// { name, errors, message, done: [{ name, stats, result }] } is printed.
 
 import { createServer } from "node:http";
 import { readFile, writeFile } from "node:fs/promises";
@@ -63,56 +65,45 @@ try {
 }
 console.log(JSON.stringify(report));
 
-async function open({ name, query, width, height, phone, script, shot, expectMessage }) {
+async function open({ name, query, width, height, phone, light, scripts, window, expectMessage }) {
   const errors = [];
   const context = await browser.newContext({
     viewport: { width, height },
     deviceScaleFactor: 1,
     hasTouch: Boolean(phone),
-    colorScheme: phone ? "light" : "dark",
+    colorScheme: light ? "light" : "dark",
   });
   const tab = await context.newPage();
   tab.on("console", (line) => {
     if (line.type() === "error") errors.push(`console: ${line.text()}`);
   });
   tab.on("pageerror", (error) => errors.push(`page: ${error.message}`));
-  const result = { name, errors, message: null, stats: null, result: null };
+  const result = { name, errors, message: null, done: [] };
+  const said = async () => ((await tab.isVisible("#message")) ? (await tab.innerText("#message")).trim() : null);
   try {
     await tab.goto(`${origin}/${query}`);
     await tab.waitForFunction(
-      () => globalThis.dapple || !document.getElementById("message").hidden,
-      null,
+      (expectMessage) => (globalThis.dapple && !expectMessage) || !document.getElementById("message").hidden,
+      expectMessage,
       { timeout: PATIENCE_MS },
     );
-    if (expectMessage) {
-      await tab.waitForFunction(() => !document.getElementById("message").hidden, null, { timeout: PATIENCE_MS });
-    }
-    const said = async () => ((await tab.isVisible("#message")) ? (await tab.innerText("#message")).trim() : null);
     result.message = await said();
     if (result.message === null) {
-      const outcome = await tab.evaluate(
-        async ({ script, patience }) => {
-          const late = new Promise((_, reject) => setTimeout(() => reject(new Error("not ready in time")), patience));
-          await Promise.race([globalThis.dapple.ready, late]);
-          const body = Object.getPrototypeOf(async () => {}).constructor("viewer", script ?? "");
-          const result = await body(globalThis.dapple);
-          const blob = await globalThis.dapple.screenshot();
-          const bytes = new Uint8Array(await blob.arrayBuffer());
-          let text = "";
-          for (const byte of bytes) text += String.fromCharCode(byte);
-          return { result: result ?? null, stats: globalThis.dapple.stats, png: btoa(text) };
-        },
-        { script, patience: PATIENCE_MS },
-      );
-      await writeFile(join(plan.out, `${name}.png`), Buffer.from(outcome.png, "base64"));
-      result.stats = outcome.stats;
-      result.result = outcome.result;
+      await tab.evaluate(async (patience) => {
+        const late = new Promise((_, reject) => setTimeout(() => reject(new Error("not ready in time")), patience));
+        await Promise.race([globalThis.dapple.ready, late]);
+      }, PATIENCE_MS);
+      for (const { name, script } of scripts ?? []) {
+        const { png, ...outcome } = await tab.evaluate(run, script);
+        await writeFile(join(plan.out, `${name}.png`), Buffer.from(png, "base64"));
+        result.done.push({ name, ...outcome });
+      }
       result.message = await said();
     }
-    if (shot) {
+    if (window) {
       // Figures are renewed twice a second.
-      await tab.waitForTimeout(1200);
-      await tab.screenshot({ path: join(plan.out, `${name}-window.png`) });
+      if (result.message === null) await tab.waitForTimeout(1200);
+      await tab.screenshot({ path: join(plan.out, `${name}.png`) });
     }
   } catch (error) {
     errors.push(`driver: ${error.message}`);
@@ -120,4 +111,15 @@ async function open({ name, query, width, height, phone, script, shot, expectMes
     await context.close();
   }
   return result;
+}
+
+// In the page: a script, and the picture after it.
+async function run(script) {
+  const body = Object.getPrototypeOf(async () => {}).constructor("viewer", script);
+  const result = await body(globalThis.dapple);
+  const blob = await globalThis.dapple.screenshot();
+  const bytes = new Uint8Array(await blob.arrayBuffer());
+  let text = "";
+  for (const byte of bytes) text += String.fromCharCode(byte);
+  return { result: result ?? null, stats: globalThis.dapple.stats, png: btoa(text) };
 }

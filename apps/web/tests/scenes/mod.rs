@@ -1,7 +1,7 @@
 //! What the browser is shown, and the twin's pictures of the same.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, LazyLock};
+use std::sync::Arc;
 
 use dapple_client::{Client, PictureParams, Reconstruction, draw};
 use dapple_render::image::ToneMap;
@@ -12,11 +12,12 @@ use dapple_server::{Server, ServerConfig};
 use dapple_stream::{Limits, Recorder, RecordingHeader};
 
 /// Size of the pictures, pixels.
-pub(crate) const WIDTH: u32 = 640;
+pub(crate) const WIDTH: u32 = 320;
 /// Size of the pictures, pixels.
-pub(crate) const HEIGHT: u32 = 360;
-/// Length of a stream, seconds, and its updates a second.
-const SECONDS: u32 = 1;
+pub(crate) const HEIGHT: u32 = 180;
+/// Texels along a side of the shadow maps, in the page and the twin.
+pub(crate) const SHADOW_RESOLUTION: u32 = 512;
+/// Updates a second.
 const HZ: u32 = 15;
 /// Vertical field of view, degrees.
 pub(crate) const YFOV_DEGREES: f32 = 60.0;
@@ -39,7 +40,7 @@ pub(crate) struct Shot {
 
 /// A scene, its stream, and pictures of both.
 pub(crate) struct Prepared {
-    name: &'static str,
+    pub(crate) name: &'static str,
     glb: Vec<u8>,
     stream: Vec<u8>,
     /// As the scene's first camera sees it at the start, and something that moves at the end.
@@ -51,44 +52,51 @@ impl Prepared {
     pub(crate) fn query(&self) -> String {
         format!("?scene=data/{0}.glb&stream=data/{0}.dapple", self.name)
     }
+
+    /// Writes the scene and its stream into a folder, as `NAME.glb` and `NAME.dapple`.
+    pub(crate) fn write(&self, folder: &Path) {
+        let file = |extension| folder.join(format!("{}.{extension}", self.name));
+        std::fs::write(file("glb"), &self.glb).expect("the scene is written");
+        std::fs::write(file("dapple"), &self.stream).expect("the stream is written");
+    }
 }
 
-/// Writes the built-in hall and its stream into a folder, as `hall.glb` and `hall.dapple`.
-pub(crate) fn prepare_hall(folder: &Path) -> &'static Prepared {
-    // All tests of a run show the same.
-    static HALL: LazyLock<Prepared> = LazyLock::new(|| {
-        make("hall", builtin::glb("atrium", 0.1).expect("a built-in scene"), &ServerConfig::default(), 128.0)
-    });
-    write(folder, &HALL);
-    &HALL
+/// The built-in hall in few triangles, its stream of one second, and pictures.
+pub(crate) fn hall() -> Prepared {
+    make("hall", hall_glb(), &ServerConfig::default(), 64.0, 1, true)
 }
 
-/// Writes a walking figure, as `walker.glb` and `walker.dapple`, if it is at hand.
-pub(crate) fn prepare_walker(folder: &Path) -> Option<&'static Prepared> {
-    static WALKER: LazyLock<Option<Prepared>> = LazyLock::new(|| {
-        let shared = std::env::var_os("DAPPLE_SHARED")
-            .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"), PathBuf::from);
-        let file = shared.join("scenes/anim-CesiumMan/CesiumMan.glb");
-        let Ok(glb) = std::fs::read(&file) else {
-            eprintln!("skipped: a walker in the page: no {}", file.display());
-            return None;
-        };
-        let mut config = ServerConfig::default();
-        config.update.radius_m = 0.3;
-        Some(make("walker", glb, &config, 4000.0))
-    });
-    let walker = WALKER.as_ref()?;
-    write(folder, walker);
-    Some(walker)
+/// The hall with so few points that they are soon traced, without pictures; 0 seconds are a snapshot alone.
+pub(crate) fn hint_of_a_hall(seconds: u32) -> Prepared {
+    make("hall", hall_glb(), &ServerConfig::default(), 8.0, seconds, false)
 }
 
-fn write(folder: &Path, prepared: &Prepared) {
-    let file = |extension| folder.join(format!("{}.{extension}", prepared.name));
-    std::fs::write(file("glb"), &prepared.glb).expect("the scene is written");
-    std::fs::write(file("dapple"), &prepared.stream).expect("the stream is written");
+fn hall_glb() -> Vec<u8> {
+    builtin::glb("atrium", 0.02).expect("a built-in scene")
 }
 
-fn make(name: &'static str, glb: Vec<u8>, config: &ServerConfig, points_per_m2: f32) -> Prepared {
+/// A walking figure, if it is at hand.
+pub(crate) fn walker() -> Option<Prepared> {
+    let shared = std::env::var_os("DAPPLE_SHARED")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"), PathBuf::from);
+    let file = shared.join("scenes/anim-CesiumMan/CesiumMan.glb");
+    let Ok(glb) = std::fs::read(&file) else {
+        eprintln!("skipped: a walker in the page: no {}", file.display());
+        return None;
+    };
+    let mut config = ServerConfig::default();
+    config.update.radius_m = 0.3;
+    Some(make("walker", glb, &config, 4000.0, 1, true))
+}
+
+fn make(
+    name: &'static str,
+    glb: Vec<u8>,
+    config: &ServerConfig,
+    points_per_m2: f32,
+    seconds: u32,
+    takes_pictures: bool,
+) -> Prepared {
     let scene = Arc::new(dapple_scene::load("scene.glb", &glb, &NoFiles).expect("a scene"));
     let mut config = *config;
     config.generate.points_per_m2 = points_per_m2;
@@ -97,12 +105,12 @@ fn make(name: &'static str, glb: Vec<u8>, config: &ServerConfig, points_per_m2: 
     let header = RecordingHeader {
         scene_hash: scene.hash().0,
         name: name.to_owned(),
-        duration_us: u64::from(SECONDS) * 1_000_000,
+        duration_us: u64::from(seconds) * 1_000_000,
     };
     let (mut recorder, mut stream) = Recorder::new(&header).expect("a recorder");
 
     let mut shots = Vec::new();
-    for tick in 0..=SECONDS * HZ {
+    for tick in 0..=seconds * HZ {
         let time_s = f64::from(tick) / f64::from(HZ);
         let frame = server.step(time_s).expect("a step").frame;
         let frame = if tick == 0 { server.join().expect("a snapshot") } else { frame };
@@ -111,7 +119,7 @@ fn make(name: &'static str, glb: Vec<u8>, config: &ServerConfig, points_per_m2: 
             stream.extend(recorder.frame(time_us, &frame.bytes).expect("frames in order"));
             client.receive(&frame.bytes).expect("a sound frame");
         }
-        if tick == 0 {
+        if tick == 0 && takes_pictures {
             let path = scene.camera_paths().swap_remove(0);
             let camera = path.camera(&scene, &scene.pose(0.0));
             let eye = camera.eye_world();
@@ -119,17 +127,19 @@ fn make(name: &'static str, glb: Vec<u8>, config: &ServerConfig, points_per_m2: 
             shots.push(take(format!("{name}-start"), &scene, &client, (eye, target), time_s));
         }
     }
-    let time_s = f64::from(SECONDS);
-    let place = before_a_mover(&scene, time_s);
-    shots.push(take(format!("{name}-mover"), &scene, &client, place, time_s));
+    if takes_pictures {
+        let time_s = f64::from(seconds);
+        let place = before_a_mover(&scene, time_s);
+        shots.push(take(format!("{name}-mover"), &scene, &client, place, time_s));
+    }
     stream.extend(recorder.finish());
     Prepared { name, glb, stream, shots }
 }
 
 fn take(name: String, scene: &Scene, client: &Client, (eye, target): (Vec3, Vec3), time_s: f64) -> Shot {
     let camera = PosedCamera::look_at(eye, target, YFOV_DEGREES.to_radians());
-    let params =
-        PictureParams { width: WIDTH, height: HEIGHT, supersample: 2, shade: ShadeParams::default() };
+    let shade = ShadeParams { shadow_resolution: SHADOW_RESOLUTION, ..ShadeParams::default() };
+    let params = PictureParams { width: WIDTH, height: HEIGHT, supersample: 2, shade };
     let drawn = draw(scene, &camera, time_s, &params).expect("a picture");
     let visibility = client.visibility(&drawn, &Reconstruction::default());
     let [lit, open] = [Some(visibility.as_slice()), None].map(|visibility| {
@@ -142,7 +152,9 @@ fn take(name: String, scene: &Scene, client: &Client, (eye, target): (Vec3, Vec3
 /// Eye and target from where most of something is seen that stands elsewhere than at the start.
 fn before_a_mover(scene: &Scene, time_s: f64) -> (Vec3, Vec3) {
     let (start, pose) = (scene.pose(0.0), scene.pose(time_s));
-    let params = PictureParams { width: 64, height: 36, supersample: 1, shade: ShadeParams::default() };
+    // Only what is seen is asked.
+    let shade = ShadeParams { max_shadowed_lights: 0, ..ShadeParams::default() };
+    let params = PictureParams { width: 64, height: 36, supersample: 1, shade };
     let mut best = (0, Vec3::ONE, Vec3::ZERO);
     for index in 0..scene.instances.len() {
         let [before, bounds] = [&start, &pose].map(|pose| scene.instance_bounds_world(pose, index));

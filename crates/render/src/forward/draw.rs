@@ -140,8 +140,10 @@ impl Forward {
         let cameras = cameras.collect::<Result<Vec<_>, _>>()?;
 
         scene.place(gpu, inputs.pose);
-        let lights = FrameLights::new(gpu, scene, inputs.pose, inputs.shade);
-        if self.shadows.draw(gpu, encoder, scene, &lights, &self.casters) {
+        let clips: Vec<_> = cameras.iter().map(|camera| camera.clip_from_world).collect();
+        let lights = FrameLights::new(gpu, scene, inputs.pose, inputs.shade, &clips);
+        let shadows = self.shadows.draw(gpu, encoder, scene, &lights, &self.casters);
+        if shadows.is_another_texture {
             self.frame_group =
                 frame_group(gpu, &self.frame_layout, &self.frames, &self.lights, &self.shadows);
         }
@@ -149,7 +151,8 @@ impl Forward {
         self.write_frames(gpu, inputs, &cameras, lights.count);
         self.prepare_targets(gpu, size);
 
-        let mut drawn = Drawn { ignored_lights: lights.ignored, ..Drawn::default() };
+        let mut drawn =
+            Drawn { ignored_lights: lights.ignored, shadow_faces: shadows.faces, ..Drawn::default() };
         let mut lists = Vec::with_capacity(inputs.views.len());
         for (view, camera) in inputs.views.iter().zip(&cameras) {
             let list = self.list(gpu, scene, inputs, view, camera, view.lookup);
@@ -303,7 +306,7 @@ impl Forward {
         camera: &ViewCamera,
         lookup: LookupId,
     ) -> Vec<Draw> {
-        let mut opaque = Vec::new();
+        let mut opaque: Vec<(f32, Draw)> = Vec::new();
         let mut blended: Vec<(f32, Draw)> = Vec::new();
         let blends = inputs.transparency == Transparency::Blend && view.kind.is_lit();
         for batch in &scene.batches {
@@ -312,6 +315,9 @@ impl Forward {
                 !is_outside(&scene.bounds.world[scene.instance_at(slot)], &camera.clip_from_world)
             };
             for (first, end) in runs(batch.first, batch.count, seen) {
+                let distance =
+                    |slot: u32| camera.distance(scene.bounds.world[scene.instance_at(slot)].center());
+                let nearest = (first..end).map(distance).fold(f32::INFINITY, f32::min);
                 for (part, range) in mesh.parts.iter().enumerate() {
                     let material = &scene.materials[range.material as usize];
                     let is_blended = blends && material.alpha == AlphaMode::Blend;
@@ -327,21 +333,19 @@ impl Forward {
                     self.pipelines.prepare(gpu, key);
                     let draw = Draw { key, mesh: batch.mesh, part, first, end };
                     if is_blended {
-                        blended.extend((first..end).map(|slot| {
-                            let center = scene.bounds.world[scene.instance_at(slot)].center();
-                            let distance = camera.distance(center);
-                            (distance, Draw { first: slot, end: slot + 1, ..draw })
-                        }));
+                        let one = |slot| (distance(slot), Draw { first: slot, end: slot + 1, ..draw });
+                        blended.extend((first..end).map(one));
                     } else {
-                        opaque.push(draw);
+                        opaque.push((nearest, draw));
                     }
                 }
             }
         }
-        opaque.sort_by_key(|draw| draw.key);
+        // What is near hides what is far, whose light then need not be worked out: that costs more than what changing
+        // from one pipeline to another does.
+        opaque.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.key.cmp(&b.1.key)));
         blended.sort_by(|a, b| b.0.total_cmp(&a.0));
-        opaque.extend(blended.into_iter().map(|(_, draw)| draw));
-        opaque
+        opaque.into_iter().chain(blended).map(|(_, draw)| draw).collect()
     }
 
     /// Draws a list; returns the number of calls and of triangles.

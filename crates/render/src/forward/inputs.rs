@@ -123,4 +123,6 @@ pub struct Drawn {
     pub triangles: u64,
     /// Lights that were left out because there are more than [`super::MAX_LIGHTS`].
     pub ignored_lights: u32,
+    /// Faces of shadow maps that were drawn anew; the others show what they did.
+    pub shadow_faces: u32,
 }

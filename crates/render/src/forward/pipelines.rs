@@ -40,6 +40,9 @@ pub(super) fn caster_module() -> String {
     join(&[MATH_WGSL, DEFORM_WGSL, MATERIAL_WGSL, include_str!("wgsl/caster.wgsl")])
 }
 
+/// The file that empties a face of the shadow maps.
+pub(super) const CLEAR_WGSL: &str = include_str!("wgsl/clear.wgsl");
+
 /// The files of the points.
 pub(super) fn points_module() -> String {
     join(&[FRAME_WGSL, MATH_WGSL, RAMP_WGSL, include_str!("wgsl/points.wgsl")])
@@ -275,11 +278,13 @@ fn plain(device: &wgpu::Device, p: Plain<'_>) -> wgpu::RenderPipeline {
     })
 }
 
-/// The two pipelines of shadow maps.
+/// The pipelines of shadow maps.
 #[derive(Debug)]
 pub(super) struct CasterPipelines {
     pub(super) solid: wgpu::RenderPipeline,
     pub(super) masked: wgpu::RenderPipeline,
+    /// Empties the viewport.
+    pub(super) clear: wgpu::RenderPipeline,
 }
 
 impl CasterPipelines {
@@ -316,7 +321,7 @@ impl CasterPipelines {
                 cache: None,
             })
         };
-        CasterPipelines { solid: make(false), masked: make(true) }
+        CasterPipelines { solid: make(false), masked: make(true), clear: clear(device) }
     }
 
     /// Whether a material whose alpha is the same everywhere is one hole.
@@ -331,4 +336,31 @@ impl CasterPipelines {
         let uv = [glam::Vec2::ZERO; 2];
         crate::texture::base_color(scene, material, &uv, glam::Vec4::ONE).w < cutoff
     }
+}
+
+fn clear(device: &wgpu::Device) -> wgpu::RenderPipeline {
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("clear"),
+        bind_group_layouts: &[],
+        immediate_size: 0,
+    });
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("clear"),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module: &shader_module(device, "clear", CLEAR_WGSL),
+            entry_point: Some("clear_vertex"),
+            compilation_options: Default::default(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: Some(wgpu::DepthStencilState {
+            depth_compare: Some(wgpu::CompareFunction::Always),
+            ..depth(true)
+        }),
+        multisample: multisample(1),
+        fragment: None,
+        multiview_mask: None,
+        cache: None,
+    })
 }

@@ -20,8 +20,9 @@ pub(crate) struct Deformation {
     pub(crate) headers: Vec<u32>,
     /// Where each mesh's influences and displacements begin.
     places: Vec<MeshPlace>,
-    /// The pose's texels, kept from frame to frame.
+    /// The pose's texels, and those of the pose before.
     texels: Vec<[f32; 4]>,
+    texels_before: Vec<[f32; 4]>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -66,12 +67,22 @@ impl Deformation {
             headers,
             places,
             texels: Vec::with_capacity(next),
+            texels_before: Vec::new(),
         })
     }
 
-    /// Writes joints and weights of a pose. Nothing to do in a scene where all is rigid.
-    pub(super) fn write_pose(&mut self, gpu: &Gpu, scene: &Scene, pose: &Pose) {
+    /// Writes joints and weights of a pose, and tells which instances have others than before. Nothing to do in a scene
+    /// where all is rigid.
+    pub(super) fn write_pose(
+        &mut self,
+        gpu: &Gpu,
+        scene: &Scene,
+        pose: &Pose,
+        mut has_changed: impl FnMut(usize),
+    ) {
+        std::mem::swap(&mut self.texels, &mut self.texels_before);
         self.texels.clear();
+        let mut is_same = true;
         for (i, instance) in scene.instances.iter().enumerate() {
             if self.headers[i] == RIGID {
                 continue;
@@ -93,15 +104,16 @@ impl Deformation {
             self.texels.extend(joints.iter().flat_map(rows));
             let places = header_texels(scene, i) - 2 - 3 * joints.len();
             self.texels.extend((0..places).map(|t| [weights.get(t).copied().unwrap_or(0.0), 0.0, 0.0, 0.0]));
+            let range = self.headers[i] as usize..self.texels.len();
+            let before = self.texels_before.get(range.clone()).unwrap_or_default();
+            if bytemuck::cast_slice::<_, u8>(before) != bytemuck::cast_slice::<_, u8>(&self.texels[range]) {
+                is_same = false;
+                has_changed(i);
+            }
         }
-        if !self.texels.is_empty() {
+        if !is_same {
             write(gpu, &self.pose_texture, POSE_WIDTH, &mut self.texels);
         }
-    }
-
-    /// What was last written, for comparing one pose with another.
-    pub(crate) fn texels(&self) -> &[[f32; 4]] {
-        &self.texels
     }
 }
 

@@ -61,6 +61,9 @@ pub struct GpuScene {
     pub(super) group: wgpu::BindGroup,
     pub(super) instance_buffer: Growing,
     raw: Vec<InstanceRaw>,
+    /// What the raw instances were the frame before.
+    raw_before: Vec<InstanceRaw>,
+    motion: Motion,
     pub(super) batches: Vec<Batch>,
     pub(super) bounds: CasterBounds,
 }
@@ -72,6 +75,15 @@ struct Charted {
     charts: Arc<ChartSet>,
     /// Instances that draw it.
     users: usize,
+}
+
+/// When each instance was last seen elsewhere, or in another shape, than the time before.
+#[derive(Debug, Default)]
+struct Motion {
+    /// Number of the pose.
+    now: u64,
+    /// For each instance the pose in which it last moved, and its place since then.
+    last: Vec<(u64, [[f32; 4]; 3])>,
 }
 
 /// Instances in a row of the instance buffer that are drawn alike.
@@ -122,6 +134,8 @@ impl GpuScene {
             instance_buffer: Growing::new(&gpu.device, "instances", size, wgpu::BufferUsages::VERTEX),
             bounds: CasterBounds::new(&scene),
             raw: Vec::new(),
+            raw_before: Vec::new(),
+            motion: Motion::default(),
             batches: Vec::new(),
             scene,
             meshes,
@@ -286,6 +300,7 @@ impl GpuScene {
             })
             .collect();
         order.sort_unstable();
+        std::mem::swap(&mut self.raw, &mut self.raw_before);
         self.raw.clear();
         self.batches.clear();
         for &(mesh, mirrored, i) in &order {
@@ -302,19 +317,38 @@ impl GpuScene {
                 _ => self.batches.push(Batch { mesh, mirrored, first: slot, count: 1 }),
             }
         }
-        self.instance_buffer.write(gpu, bytemuck::cast_slice(&self.raw));
-        self.deformation.write_pose(gpu, &self.scene, pose);
+        let bytes: &[u8] = bytemuck::cast_slice(&self.raw);
+        if bytes != bytemuck::cast_slice::<_, u8>(&self.raw_before) {
+            self.instance_buffer.write(gpu, bytes);
+        }
+        self.motion.now += 1;
+        let now = self.motion.now;
+        let last = &mut self.motion.last;
+        last.resize(self.instances.len(), (now, [[0.0; 4]; 3]));
+        for raw in &self.raw {
+            let slot = &mut last[raw.ids[0] as usize];
+            // As bytes, or what is no number would move for ever.
+            if bytemuck::bytes_of(&slot.1) != bytemuck::bytes_of(&raw.world) {
+                *slot = (now, raw.world);
+            }
+        }
+        self.deformation.write_pose(gpu, &self.scene, pose, |instance| last[instance].0 = now);
         self.bounds.place(&self.scene, pose);
+    }
+
+    /// The number of the pose that is placed; each one is greater than those before.
+    pub(super) fn now(&self) -> u64 {
+        self.motion.now
+    }
+
+    /// The number of the pose in which an instance came to where, and got the shape that, it has now.
+    pub(super) fn moved_at(&self, instance: usize) -> u64 {
+        self.motion.last[instance].0
     }
 
     /// The instance that stands at a place of the instance buffer.
     pub(super) fn instance_at(&self, slot: u32) -> usize {
         self.raw[slot as usize].ids[0] as usize
-    }
-
-    /// What the instance buffer holds.
-    pub(super) fn raw(&self) -> &[InstanceRaw] {
-        &self.raw
     }
 }
 

@@ -98,6 +98,10 @@ impl Level {
     }
 }
 
+/// How many times as long as wide a pixel's print on a texture may be before its smaller levels blur it along too: floors
+/// and walls that run away from the viewer keep their joints.
+const ANISOTROPY: u16 = 8;
+
 /// The sampler that a texture asks for.
 pub(super) fn sampler(gpu: &Gpu, texture: &Texture, mips: bool) -> wgpu::Sampler {
     let address = |wrap| match wrap {
@@ -116,6 +120,8 @@ pub(super) fn sampler(gpu: &Gpu, texture: &Texture, mips: bool) -> wgpu::Sampler
         mag_filter: filter,
         min_filter: if mips { wgpu::FilterMode::Linear } else { filter },
         mipmap_filter: if mips { wgpu::MipmapFilterMode::Linear } else { wgpu::MipmapFilterMode::Nearest },
+        // Only where everything is filtered. Devices that cannot do it take 1.
+        anisotropy_clamp: if mips && texture.filter == Filter::Linear { ANISOTROPY } else { 1 },
         ..Default::default()
     })
 }

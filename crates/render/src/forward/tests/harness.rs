@@ -6,7 +6,9 @@ use dapple_gpu::testing::{block_on, gpu_for_tests};
 use dapple_gpu::{Gpu, read_texture, wgpu};
 use dapple_scene::{Pose, PosedCamera, Scene};
 
-use super::super::{Forward, FrameInputs, GpuScene, GpuSceneOptions, Lookup, LookupId, Transparency, View};
+use super::super::{
+    Drawn, Forward, FrameInputs, GpuScene, GpuSceneOptions, Lookup, LookupId, Transparency, View,
+};
 use crate::compose::compose;
 use crate::gbuffer::{GBuffer, rasterize};
 use crate::image::{Rgb8Image, ToneMap};
@@ -19,6 +21,8 @@ pub(super) struct Bench {
     pub(super) gpu: Gpu,
     pub(super) scene: GpuScene,
     pub(super) forward: Forward,
+    /// What the last picture came to.
+    pub(super) drawn: Drawn,
 }
 
 impl Bench {
@@ -28,7 +32,7 @@ impl Bench {
         let options = GpuSceneOptions { mips: false };
         let gpu_scene = GpuScene::new(&gpu, Arc::new(scene.clone()), &options).unwrap();
         let forward = Forward::new(&gpu, FORMAT, samples, lookups).unwrap();
-        Some(Bench { gpu, scene: gpu_scene, forward })
+        Some(Bench { gpu, scene: gpu_scene, forward, drawn: Drawn::default() })
     }
 
     pub(super) fn draw(&mut self, (width, height): (u32, u32), inputs: &FrameInputs<'_>) -> Rgb8Image {
@@ -44,7 +48,8 @@ impl Bench {
         });
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        self.forward.draw(&self.gpu, &mut encoder, &view, (width, height), &mut self.scene, inputs).unwrap();
+        let (gpu, size) = (&self.gpu, (width, height));
+        self.drawn = self.forward.draw(gpu, &mut encoder, &view, size, &mut self.scene, inputs).unwrap();
         self.gpu.queue.submit([encoder.finish()]);
         let bytes = block_on(read_texture(&self.gpu, &texture, 0)).unwrap();
         let pixels = bytes.chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect();

@@ -6,4 +6,5 @@ mod atlas;
 mod harness;
 mod motion;
 mod shaders;
+mod shadows;
 mod views;

@@ -22,7 +22,7 @@ const SIZE: (u32, u32) = (240, 160);
 
 /// A ball that swells to one side (two targets) and is bent by three joints in two sets of influences, on a floor; and
 /// one that only swells.
-fn bent_and_swollen() -> Scene {
+pub(super) fn bent_and_swollen() -> Scene {
     let ball = |name: &str| {
         let mut mesh = Mesh { name: name.into(), ..sphere(16, 24) };
         mesh.parts =
@@ -264,26 +264,6 @@ fn the_atrium_looks_as_the_twin_draws_it() {
         pictures.push(card);
     }
     assert_ne!(pictures[0], pictures[1], "boulders move");
-}
-
-#[test]
-fn shadow_maps_are_drawn_again_only_when_something_moved() {
-    let scene = bent_and_swollen();
-    let Some(mut bench) = Bench::new(&scene, 1, &[]) else { return };
-    let camera = PosedCamera::look_at(Vec3::new(1.5, 3.0, 5.5), Vec3::new(0.0, 0.9, 0.0), 0.8);
-    let params = ShadeParams { shadow_resolution: 512, ..ShadeParams::default() };
-    let first = bench.beauty(SIZE, &scene.pose(0.0), &camera, &params);
-    assert_eq!(
-        first,
-        bench.beauty(SIZE, &scene.pose(0.0), &camera, &params),
-        "a still scene gives the same picture"
-    );
-    let moved = bench.beauty(SIZE, &scene.pose(0.6), &camera, &params);
-    let fresh = Bench::new(&scene, 1, &[]).unwrap().beauty(SIZE, &scene.pose(0.6), &camera, &params);
-    assert_eq!(moved, fresh, "no shadow of the pose before is left");
-    let smaller = ShadeParams { shadow_resolution: 128, ..params };
-    assert_ne!(moved, bench.beauty(SIZE, &scene.pose(0.6), &camera, &smaller));
-    assert_eq!(moved, bench.beauty(SIZE, &scene.pose(0.6), &camera, &params));
 }
 
 /// Files beside a scene's file.

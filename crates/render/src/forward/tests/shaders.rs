@@ -6,8 +6,8 @@ use dapple_gpu::testing::{check_struct, naga::ShaderStage, translate_to_webgl2, 
 
 use super::super::lookup::{Lookup, built_in};
 use super::super::pipelines::{
-    DEFORM_WGSL, FRAME_WGSL, MATERIAL_WGSL, MATH_WGSL, caster_module, error_module, forward_module,
-    points_module,
+    CLEAR_WGSL, DEFORM_WGSL, FRAME_WGSL, MATERIAL_WGSL, MATH_WGSL, caster_module, error_module,
+    forward_module, points_module,
 };
 use super::super::uniforms::*;
 
@@ -31,6 +31,8 @@ fn every_module_is_valid_and_within_webgl2() {
                 .unwrap_or_else(|e| panic!("{}, {entry}: {e}", lookup.label));
         }
     }
+    let clear = validate(CLEAR_WGSL).unwrap();
+    translate_to_webgl2(&clear, ShaderStage::Vertex, "clear_vertex").unwrap();
     for (module, vertex, fragment) in [
         (caster_module(), vec!["caster_solid", "caster_masked"], "caster_holes"),
         (points_module(), vec!["point_vertex"], "point_fragment"),

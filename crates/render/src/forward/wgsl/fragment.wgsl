@@ -74,17 +74,28 @@ fn fragment(varyings: Varyings, @builtin(front_facing) is_front: bool) -> @locat
     let surface = reflectance(base_color.rgb, material.metallic * metal_texel.b, material.roughness * metal_texel.g);
     var radiance = material.emissive * emissive_texel.rgb;
     radiance += ambient_reflected(surface, normal, to_viewer) * visibility;
-    for (var i = 0u; i < frame.light_count; i++) {
-        let light = lights.lights[i];
-        let arrived = arriving(light, input.position_world);
-        let cosine = dot(normal, arrived.to_light);
-        // Light from behind the true surface cannot reach it, whatever the interpolated normal says.
-        if cosine <= 0.0 || dot(flat_normal, arrived.to_light) <= 0.0 || all(arrived.intensity == vec3(0.0)) {
-            continue;
+    for (var first = 0u; first < frame.light_count; first += 32u) {
+        // Which lights arrive is found before any is reflected: then neighbours that are lit by different lights do the
+        // costly part side by side, and as often as one of them has lights, not as often as all of them have together.
+        var arriving_lights = 0u;
+        let end = min(frame.light_count - first, 32u);
+        for (var i = 0u; i < end; i++) {
+            let arrived = arriving(lights.lights[first + i], input.position_world);
+            // Light from behind the true surface cannot reach it, whatever the interpolated normal says.
+            let is_lit = dot(normal, arrived.to_light) > 0.0 && dot(flat_normal, arrived.to_light) > 0.0;
+            arriving_lights |= select(0u, 1u << i, is_lit && any(arrived.intensity != vec3(0.0)));
         }
-        let lit = lit_fraction(light, input.position_world, flat_normal, arrived.to_light);
-        if lit > 0.0 {
-            radiance += reflected(surface, normal, to_viewer, arrived.to_light) * arrived.intensity * (cosine * lit);
+        while arriving_lights != 0u {
+            let lowest = arriving_lights & (~arriving_lights + 1u);
+            arriving_lights ^= lowest;
+            // The exponent of a power of two is its bit's number; GLSL of WebGL2 has no other way to it.
+            let light = lights.lights[first + (bitcast<u32>(f32(lowest)) >> 23u) - 127u];
+            let arrived = arriving(light, input.position_world);
+            let lit = lit_fraction(light, input.position_world, flat_normal, arrived.to_light);
+            if lit > 0.0 {
+                let cosine = dot(normal, arrived.to_light);
+                radiance += reflected(surface, normal, to_viewer, arrived.to_light) * arrived.intensity * (cosine * lit);
+            }
         }
     }
     return vec4(displayed(radiance), alpha);
