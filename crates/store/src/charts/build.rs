@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::flatten::Flat;
-use super::grow::{GrowParams, Growth, Grown};
+use super::grow::{GrowParams, Grown, Growth};
 use super::pack::{Packed, pack};
 use super::per_vertex::vertex_pages;
 use super::set::{Chart, ChartError, ChartParams, ChartUv, MOST_TEXELS, PageSize};

@@ -28,7 +28,7 @@ pub use kernel::{Fit, MovingLeastSquares, Weighed};
 pub use plan::{InstanceKey, SceneCharts};
 pub use set::{
     ChartBuilder, ChartError, ChartParams, ChartSet, ChartUv, ChartVertices, MOST_TEXELS, PageSize, Site,
-    TEXEL_FRACTION,
+    SiteFinder, TEXEL_FRACTION,
 };
 pub use sides::add_back_sites;
 pub use weights::{

@@ -5,8 +5,9 @@ use glam::{DVec3, Vec3};
 use super::build::{Layout, LayoutBuilder};
 use super::flatten::Flat;
 use super::per_vertex::vertex_sites;
-use super::raster::touched;
-use super::surface::NONE;
+
+mod sites;
+pub use sites::SiteFinder;
 
 /// Steps of a [`ChartUv`] coordinate in a texel.
 pub const TEXEL_FRACTION: u16 = 32;
@@ -350,11 +351,9 @@ impl ChartSet {
     /// Every texel that a read inside a triangle can touch, ascending. The arguments are those the set was made from.
     pub fn sites(&self, positions_rest: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Site> {
         debug_assert_eq!(triangles.len(), self.corners.len());
-        if self.per_vertex {
-            self.vertex_sites(positions_rest, triangles)
-        } else {
-            self.chart_sites(positions_rest, triangles)
-        }
+        let mut finder = SiteFinder::new(self);
+        while finder.work(self, positions_rest, triangles, usize::MAX) > 0 {}
+        finder.finish()
     }
 
     /// Number of the texel that holds a place.
@@ -380,65 +379,6 @@ impl ChartSet {
     fn front(&self, normal: DVec3) -> Vec3 {
         let normal = if normal.is_finite() { normal } else { DVec3::Y };
         if self.mirrored { -normal.as_vec3() } else { normal.as_vec3() }
-    }
-
-    fn chart_sites(&self, positions_rest: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Site> {
-        let corner_places = |t: usize| triangles[t].map(|v| finite(positions_rest[v as usize]).as_dvec3());
-        let normal_of = |t: usize| {
-            let [a, b, c] = corner_places(t);
-            let area_vector = (b - a).cross(c - a);
-            area_vector / area_vector.length()
-        };
-        // The triangle nearest to each texel, and its distance squared in texels.
-        let mut nearest = vec![(f64::INFINITY, NONE); self.texel_count() as usize];
-        for (t, corners) in self.corners.iter().enumerate() {
-            let all_finite = triangles[t].iter().all(|&v| positions_rest[v as usize].is_finite());
-            if !all_finite || !normal_of(t).is_finite() {
-                continue;
-            }
-            let page = usize::from(corners[0].page);
-            let (first, width) = (self.first_texels[page] as usize, usize::from(self.pages[page].width));
-            let flat = corners.map(|uv| {
-                glam::DVec2::new(f64::from(uv.x), f64::from(uv.y)) / f64::from(TEXEL_FRACTION) - 0.5
-            });
-            touched(flat, 1.0, |x, y, closest| {
-                let distance = closest.distance_squared(glam::DVec2::new(f64::from(x), f64::from(y)));
-                let slot = &mut nearest[first + y as usize * width + x as usize];
-                if distance < slot.0 {
-                    *slot = (distance, t as u32);
-                }
-                true
-            });
-        }
-        if let Some(lone) = self.lone {
-            let chart = &self.charts[lone as usize];
-            let [x, y] = chart.corner.map(usize::from);
-            let page = usize::from(chart.page);
-            let texel = self.first_texels[page] as usize + y * usize::from(self.pages[page].width) + x;
-            nearest[texel] = (0.0, NONE);
-        }
-        let mut sites = Vec::with_capacity(nearest.iter().filter(|n| n.0 < f64::INFINITY).count());
-        for (texel, &(distance, t)) in nearest.iter().enumerate() {
-            if distance == f64::INFINITY {
-                continue;
-            }
-            let (place, normal) = if t == NONE {
-                let lone = self.lone.map_or(DVec3::ZERO, |lone| self.charts[lone as usize].flat.frame.origin);
-                (lone, DVec3::NAN)
-            } else {
-                let chart = &self.charts[self.chart_of[t as usize] as usize];
-                let (_, x, y) = self.locate(texel as u32);
-                let within = [x - chart.corner[0], y - chart.corner[1]];
-                let normal = normal_of(t as usize);
-                (chart.flat.place_over(within, corner_places(t as usize)[0], normal), normal)
-            };
-            sites.push(Site {
-                texel: texel as u32,
-                position_rest: finite(place.as_vec3()),
-                normal_rest: self.front(normal),
-            });
-        }
-        sites
     }
 
     /// The mesh's vertices split where charts meet, and shared otherwise, ascending by source.

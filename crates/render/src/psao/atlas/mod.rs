@@ -15,9 +15,10 @@ use std::sync::Arc;
 use dapple_scene::Scene;
 use dapple_store::charts::{
     AtlasError, ChartBuilder, ChartError, ChartParams, ChartSet, Cuts, InstanceKey, PointNeighbours,
-    WeightParams, add_back_sites,
+    SiteFinder, WeightParams, add_back_sites,
 };
 use dapple_store::points::PointLayout;
+use glam::Vec3;
 
 pub use dapple_store::charts::Placement;
 pub use pages::DirtyBand;
@@ -128,7 +129,11 @@ struct Job {
 
 enum Stage {
     Charts(Box<ChartBuilder>),
-    Sites,
+    Sites {
+        finder: Box<SiteFinder>,
+        /// Of the mesh.
+        positions_rest: Vec<Vec3>,
+    },
     Weigh(Box<Builder>),
     Encode(Box<Builder>),
     /// Points before `next` are in the sums.
@@ -145,7 +150,7 @@ const CHANGES_A_BATCH: usize = 32;
 /// Texels of work that other steps are worth, in parts of a weighed texel.
 const TRIANGLES_A_TEXEL: usize = 8;
 const VISITS_A_TEXEL: usize = 32;
-const SITES_A_TEXEL: usize = 8;
+const SITES_A_TEXEL: usize = 32;
 const ENCODED_A_TEXEL: usize = 16;
 const SUMMED_A_TEXEL: usize = 16;
 
@@ -223,7 +228,7 @@ impl VisibilityAtlas {
             let texels = job.charts.texel_count() as usize;
             match &job.stage {
                 Stage::Charts(builder) => (builder.left() * points as f64) as usize + 3 * points + 1,
-                Stage::Sites => texels + 1,
+                Stage::Sites { .. } => texels + texels / VISITS_A_TEXEL + 1,
                 Stage::Weigh(b) => b.sites() - b.weighed() + b.sites() / ENCODED_A_TEXEL + 1,
                 Stage::Encode(b) => (b.sites() - b.encoded()) / ENCODED_A_TEXEL + 1,
                 Stage::Sum { next, .. } => (points - next) / SUMMED_A_TEXEL + 1,
@@ -248,7 +253,8 @@ impl VisibilityAtlas {
             _ => None,
         });
         if let Some(charts) = same {
-            return (Some(Job { set, charts, charts_key: key, stage: Stage::Sites }), 1);
+            let stage = Stage::sites(&charts, key.positions_rest(&mesh.positions));
+            return (Some(Job { set, charts, charts_key: key, stage }), 1);
         }
         let cost = mesh.triangles.len() / TRIANGLES_A_TEXEL + 1;
         let positions_rest = key.positions_rest(&mesh.positions);
@@ -277,7 +283,8 @@ impl VisibilityAtlas {
                     match charts {
                         Some(charts) => {
                             job.charts = Arc::new(charts);
-                            Stage::Sites
+                            let mesh = &scene.meshes[scene.instances[set.instance as usize].mesh as usize];
+                            Stage::sites(&job.charts, job.charts_key.positions_rest(&mesh.positions))
                         }
                         None => Stage::Charts(builder),
                     }
@@ -287,17 +294,23 @@ impl VisibilityAtlas {
                     return 1;
                 }
             },
-            Stage::Sites => {
+            Stage::Sites { mut finder, positions_rest } => {
                 let mesh = &scene.meshes[scene.instances[set.instance as usize].mesh as usize];
-                let positions_rest = job.charts_key.positions_rest(&mesh.positions);
-                let mut sites = job.charts.sites(&positions_rest, &mesh.triangles);
+                let visits = budget.saturating_mul(VISITS_A_TEXEL);
+                let visited = finder.work(&job.charts, &positions_rest, &mesh.triangles, visits);
+                if visited > 0 {
+                    job.stage = Stage::Sites { finder, positions_rest };
+                    self.job = Some(job);
+                    return visited / VISITS_A_TEXEL;
+                }
+                let mut sites = finder.finish();
                 let mut texels = job.charts.texel_count();
                 if scene.is_two_sided(mesh) {
                     add_back_sites(&mut sites, texels);
                     texels *= 2;
                 }
                 let neighbours = PointNeighbours::new(&layout, set, &self.params.weights);
-                cost = sites.len() / SITES_A_TEXEL + mesh.triangles.len() / TRIANGLES_A_TEXEL;
+                cost = sites.len() / SITES_A_TEXEL;
                 let cuts = self.cuts.as_ref().and_then(|cuts| cuts.for_sites(set.instance, &sites));
                 let cuts = cuts.map_or(Vec::new(), |set| set.cuts.clone());
                 Stage::Weigh(Box::new(Builder::new(neighbours, set, sites, cuts, texels)))
@@ -472,10 +485,16 @@ impl ReadySet {
     }
 }
 
+impl Stage {
+    fn sites(charts: &ChartSet, positions_rest: Vec<Vec3>) -> Stage {
+        Stage::Sites { finder: Box::new(SiteFinder::new(charts)), positions_rest }
+    }
+}
+
 impl Job {
     fn memory_bytes(&self) -> u64 {
         let stage = match &self.stage {
-            Stage::Charts(_) | Stage::Sites => 0,
+            Stage::Charts(_) | Stage::Sites { .. } => 0,
             Stage::Weigh(builder) | Stage::Encode(builder) => builder.bytes(),
             Stage::Sum { table, sums, .. } => table.bytes() + sums.bytes(),
         };

@@ -324,6 +324,28 @@ fn many_points_are_taken_in_pieces() {
 }
 
 #[test]
+fn no_piece_is_much_longer_than_asked_for() {
+    // A ball of 120,000 triangles: its charts and sites alone are worth hundreds of pieces.
+    let mut stage = Stage::new();
+    stage.add(sphere(200, 300), 0, Affine3A::from_scale(Vec3::splat(2.0)));
+    let scene = stage.scene;
+    let layout = lay(&scene, 0.02);
+    let values = vec![128; layout.len()];
+    let mut atlas = VisibilityAtlas::new(layout, &scene, None, AtlasParams::default());
+    const PIECE: u64 = 500;
+    // A chart is grown in one piece, and the largest of the ball's are worth this.
+    const CHART: u64 = 7500;
+    let (mut pieces, mut long, mut done) = (0, 0, 0);
+    while !atlas.progress().is_complete() {
+        let progress = atlas.work(&scene, &values, PIECE as usize);
+        long += u32::from(progress.done - done > PIECE + CHART);
+        (pieces, done) = (pieces + 1, progress.done);
+    }
+    // The mesh is taken in as a whole.
+    assert!(pieces > 500 && long <= 1, "{pieces} pieces, {long} of them too long");
+}
+
+#[test]
 #[ignore = "takes a minute"]
 fn three_million_points_are_taken_in_pieces() {
     let (_, bytes) = build_in_pieces(0.0505);
