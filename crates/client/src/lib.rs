@@ -95,7 +95,7 @@ impl Client {
         match (&applied, self.atlas.get_mut()) {
             (Applied::NewLayout, _) => (self.index, self.atlas) = (OnceLock::new(), OnceLock::new()),
             (Applied::Changes(changes), Some(atlas)) => {
-                atlas.begin_update();
+                atlas.begin_update(1.0);
                 atlas.apply(changes.iter().map(|c| PointChange { point: c.point, old: c.old, new: c.new }));
             }
             _ => {}

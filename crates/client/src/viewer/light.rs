@@ -28,7 +28,8 @@ impl Light {
         Light { scene, subscriber, atlas: None, inspection, is_new: false, fade_start_s: f64::NEG_INFINITY }
     }
 
-    pub(super) fn receive(&mut self, bytes: &[u8], now_s: f64) -> Result<Applied, ReceiveError> {
+    /// `fade_s` is how long the fade takes that is shown.
+    pub(super) fn receive(&mut self, bytes: &[u8], now_s: f64, fade_s: f32) -> Result<Applied, ReceiveError> {
         let applied = self.subscriber.receive(bytes)?;
         match &applied {
             Applied::NewLayout => {
@@ -39,15 +40,16 @@ impl Light {
                     VisibilityAtlas::new(store.layout().clone(), &self.scene, cuts, AtlasParams::default())
                 });
             }
-            Applied::Changes(changes) => self.apply(changes, now_s),
+            Applied::Changes(changes) => self.apply(changes, now_s, fade_s),
             Applied::Ignored(_) => {}
         }
         Ok(applied)
     }
 
-    fn apply(&mut self, changes: &[ValueChange], now_s: f64) {
+    fn apply(&mut self, changes: &[ValueChange], now_s: f64, fade_s: f32) {
+        let progress = self.fade(now_s, fade_s);
         let Some(atlas) = &mut self.atlas else { return };
-        atlas.begin_update();
+        atlas.begin_update(progress);
         atlas.apply(changes.iter().map(|c| PointChange { point: c.point, old: c.old, new: c.new }));
         self.fade_start_s = now_s;
     }
@@ -59,14 +61,11 @@ impl Light {
             let progress = atlas.progress();
             return (progress.done, progress.total);
         }
-        // Once a fade is over, another may begin without that what is shown jumps.
-        let is_over = self.fade_start_s + f64::from(fade_s) <= now_s;
-        if is_over {
-            atlas.begin_update();
-        }
         let before = atlas.ready_count();
         let progress = atlas.work(&self.scene, store.visibility(), texels);
-        if is_over && atlas.ready_count() > before {
+        if atlas.ready_count() > before {
+            // All texels share one fade: it begins anew, for the others from what they show.
+            atlas.begin_update(fade_at(self.fade_start_s, now_s, fade_s));
             self.fade_start_s = now_s;
         }
         (progress.done, progress.total)
@@ -74,11 +73,7 @@ impl Light {
 
     /// How far the fade is at `now_s`, 0 … 1.
     pub(super) fn fade(&self, now_s: f64, fade_s: f32) -> f32 {
-        if fade_s > 0.0 {
-            ((now_s - self.fade_start_s) / f64::from(fade_s)).clamp(0.0, 1.0) as f32
-        } else {
-            1.0
-        }
+        fade_at(self.fade_start_s, now_s, fade_s)
     }
 
     /// Brings onto the card what changed since the last call.
@@ -111,4 +106,9 @@ impl Light {
         }
         Ok(())
     }
+}
+
+/// How far a fade is at `now_s` that began at `start_s` and takes `fade_s`.
+fn fade_at(start_s: f64, now_s: f64, fade_s: f32) -> f32 {
+    if fade_s > 0.0 { ((now_s - start_s) / f64::from(fade_s)).clamp(0.0, 1.0) as f32 } else { 1.0 }
 }

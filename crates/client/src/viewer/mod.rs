@@ -92,7 +92,7 @@ impl Viewer {
     /// Takes one frame off the wire, which came at `now_s` (seconds on the caller's clock, as in [`Viewer::draw`]).
     /// On an error nothing has changed.
     pub fn receive(&mut self, bytes: &[u8], now_s: f64) -> Result<Applied, ReceiveError> {
-        let applied = self.light.receive(bytes, now_s)?;
+        let applied = self.light.receive(bytes, now_s, self.fade_s)?;
         self.stats.bytes_received += bytes.len() as u64;
         self.stats.frames_received += 1;
         self.stats.last_frame_s = Some(now_s);

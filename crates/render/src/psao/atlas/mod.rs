@@ -83,9 +83,9 @@ pub struct VisibilityAtlas {
     pages: Pages,
     /// Instances that became ready since they were last asked for.
     ready: Vec<u32>,
-    /// Sets whose texels still fade in from open.
+    /// Sets whose texels fade in from open and are not listed among `fading`; the last ones are those of `ready`.
     fresh: Vec<usize>,
-    /// Texels whose two values may differ.
+    /// All other texels whose two values may differ, each once.
     fading: Vec<u32>,
     failed: Vec<(u32, BuildError)>,
 }
@@ -348,18 +348,27 @@ impl VisibilityAtlas {
         self.ready.push(self.layout.sets()[set].instance);
     }
 
-    /// Begins a fade: what was new so far becomes old. Call it before the changes of an update are applied (and show them
-    /// with a fade that starts at 0); without it texels go on fading from what they showed before.
-    pub fn begin_update(&mut self) {
-        for set in std::mem::take(&mut self.fresh) {
+    /// Begins a fade: what is shown becomes old, and what was new stays new. Call it before the changes of an update are
+    /// applied, and show them with a fade that starts at 0. `progress` is how far the fade before has come that this one
+    /// breaks off, 0 … 1 (1: it was over, and what was new becomes old). Nothing shown jumps by more than half a step of
+    /// 1/255. Without it texels go on fading from what they showed before.
+    ///
+    /// Instances that nobody has asked for yet by [`VisibilityAtlas::take_ready`] are not shown so far: whatever the
+    /// progress, they start from open.
+    pub fn begin_update(&mut self, progress: f32) {
+        // What is no number breaks nothing off.
+        let progress = if progress.is_nan() { 1.0 } else { progress.clamp(0.0, 1.0) };
+        if progress == 0.0 {
+            return;
+        }
+        self.pages.advance(&mut self.fading, progress);
+        let shown = self.fresh.len() - self.ready.len();
+        for set in self.fresh.drain(..shown) {
             if let SetState::Ready(ready) = &self.sets[set] {
                 for (placement, size) in ready.placements.iter().zip(ready.charts.pages().iter().cycle()) {
-                    self.pages.settle_page(*placement, *size);
+                    self.pages.advance_page(*placement, *size, progress, &mut self.fading);
                 }
             }
-        }
-        for address in std::mem::take(&mut self.fading) {
-            self.pages.settle(address);
         }
     }
 

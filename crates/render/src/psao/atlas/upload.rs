@@ -62,7 +62,8 @@ impl VisibilityAtlas {
         self.pages.take_dirty()
     }
 
-    /// Instances that became ready since the last call, in the order in which they did.
+    /// Instances that became ready since the last call, in the order in which they did. Until they are asked for they
+    /// count as not shown ([`VisibilityAtlas::begin_update`]).
     pub fn take_ready(&mut self) -> Vec<u32> {
         std::mem::take(&mut self.ready)
     }
