@@ -153,7 +153,7 @@ impl Core {
         }
         self.changed |= self.steering.advance(elapsed_s);
         if self.changed {
-            self.draw_until_s = now_s + LINGER_S + f64::from(self.options.fade_s);
+            self.draw_until_s = now_s + LINGER_S + f64::from(viewer.fade_s(&self.options));
         }
         if now_s > self.draw_until_s && self.options.view != DebugView::Age {
             return Ok(false);
@@ -224,10 +224,10 @@ impl Core {
         self.changed = true;
     }
 
-    /// Seconds that an update fades in over; 0 for none.
+    /// Seconds that an update fades in over; 0 for none. Until this is called, as long as updates are apart.
     #[wasm_bindgen(js_name = setFade)]
     pub fn set_fade(&mut self, fade_s: f32) {
-        self.options.fade_s = if fade_s.is_finite() { fade_s.clamp(0.0, 10.0) } else { 0.0 };
+        self.options.fade_s = Some(if fade_s.is_finite() { fade_s.clamp(0.0, 10.0) } else { 0.0 });
         self.changed = true;
     }
 

@@ -7,6 +7,7 @@
 
 pub mod clock;
 pub mod controls;
+pub mod pace;
 pub mod rate;
 #[cfg(feature = "gpu")]
 pub mod viewer;

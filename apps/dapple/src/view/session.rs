@@ -123,7 +123,7 @@ impl Session {
     }
 
     fn linger(&mut self, now_s: f64) {
-        self.draw_until_s = now_s + LINGER_S + f64::from(self.show.options.fade_s);
+        self.draw_until_s = now_s + LINGER_S + f64::from(self.show.fade_s());
     }
 
     /// Draws and shows the present.

@@ -186,6 +186,11 @@ impl Show {
         Ok(())
     }
 
+    /// Seconds that an update fades in over.
+    pub(super) fn fade_s(&self) -> f32 {
+        self.viewer.fade_s(&self.options)
+    }
+
     /// Counts a picture that was shown.
     pub(super) fn count_picture(&mut self, now_s: f64) {
         self.pictures.add(now_s, 1.0);

@@ -9,6 +9,7 @@ use dapple_scene::Scene;
 use dapple_stream::{Applied, ReceiveError, Subscriber, ValueChange};
 
 use super::inspect::Inspection;
+use crate::pace::Pace;
 
 /// What comes off the wire, resolved into texels.
 pub(super) struct Light {
@@ -20,16 +21,30 @@ pub(super) struct Light {
     is_new: bool,
     /// When the running fade began, seconds; long ago if none runs.
     fade_start_s: f64,
+    pace: Pace,
 }
 
 impl Light {
     pub(super) fn new(scene: Arc<Scene>, subscriber: Subscriber) -> Light {
         let inspection = Inspection::default();
-        Light { scene, subscriber, atlas: None, inspection, is_new: false, fade_start_s: f64::NEG_INFINITY }
+        Light {
+            scene,
+            subscriber,
+            atlas: None,
+            inspection,
+            is_new: false,
+            fade_start_s: f64::NEG_INFINITY,
+            pace: Pace::default(),
+        }
     }
 
-    /// `fade_s` is how long the fade takes that is shown.
-    pub(super) fn receive(&mut self, bytes: &[u8], now_s: f64, fade_s: f32) -> Result<Applied, ReceiveError> {
+    /// `fade_s` is how long fades take, as in [`Light::fade_s`].
+    pub(super) fn receive(
+        &mut self,
+        bytes: &[u8],
+        now_s: f64,
+        fade_s: Option<f32>,
+    ) -> Result<Applied, ReceiveError> {
         let applied = self.subscriber.receive(bytes)?;
         match &applied {
             Applied::NewLayout => {
@@ -46,8 +61,13 @@ impl Light {
         Ok(applied)
     }
 
-    fn apply(&mut self, changes: &[ValueChange], now_s: f64, fade_s: f32) {
+    fn apply(&mut self, changes: &[ValueChange], now_s: f64, fade_s: Option<f32>) {
+        // What changes nothing is no update: the fade goes on.
+        if changes.is_empty() {
+            return;
+        }
         let progress = self.fade(now_s, fade_s);
+        self.pace.note(now_s);
         let Some(atlas) = &mut self.atlas else { return };
         atlas.begin_update(progress);
         atlas.apply(changes.iter().map(|c| PointChange { point: c.point, old: c.old, new: c.new }));
@@ -55,7 +75,8 @@ impl Light {
     }
 
     /// Makes charts and weights, about `texels` of work; what becomes ready fades in from `now_s` on.
-    pub(super) fn work(&mut self, texels: usize, now_s: f64, fade_s: f32) -> (u64, u64) {
+    pub(super) fn work(&mut self, texels: usize, now_s: f64, fade_s: Option<f32>) -> (u64, u64) {
+        let fade_s = self.fade_s(fade_s);
         let (Some(atlas), Some(store)) = (&mut self.atlas, self.subscriber.store()) else { return (0, 0) };
         if atlas.progress().is_complete() {
             let progress = atlas.progress();
@@ -71,9 +92,14 @@ impl Light {
         (progress.done, progress.total)
     }
 
+    /// Seconds that a fade takes: those that are wanted, or what the pace of updates asks for.
+    pub(super) fn fade_s(&self, wanted_s: Option<f32>) -> f32 {
+        wanted_s.unwrap_or_else(|| self.pace.fade_s())
+    }
+
     /// How far the fade is at `now_s`, 0 … 1.
-    pub(super) fn fade(&self, now_s: f64, fade_s: f32) -> f32 {
-        fade_at(self.fade_start_s, now_s, fade_s)
+    pub(super) fn fade(&self, now_s: f64, fade_s: Option<f32>) -> f32 {
+        fade_at(self.fade_start_s, now_s, self.fade_s(fade_s))
     }
 
     /// Brings onto the card what changed since the last call.

@@ -40,9 +40,9 @@ pub struct Viewer {
     paper: PaperLookup,
     points: Option<PointsShown>,
     stats: ViewerStats,
-    /// The caller's clock and the fade when it last drew.
+    /// The caller's clock and the fade that was asked for when it last drew.
     now_s: f64,
-    fade_s: f32,
+    fade_s: Option<f32>,
 }
 
 /// What the points view needs, made when it is first shown.
@@ -190,6 +190,11 @@ impl Viewer {
             shown.on_card.upload(gpu, positions.into_iter().zip(values));
             shown.placed = now;
         }
+    }
+
+    /// Seconds that a fade takes now, drawn with `options`. After a change pictures differ for as long.
+    pub fn fade_s(&self, options: &DrawOptions) -> f32 {
+        self.light.fade_s(options.fade_s)
     }
 
     /// Figures for an overlay.

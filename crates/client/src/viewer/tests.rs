@@ -98,7 +98,7 @@ fn it_shows_what_the_processor_shows_after_updates_too() {
     let snapshot = server.join().expect("it can be encoded").expect("there is one");
     viewer.receive(&snapshot.bytes, 0.0).expect("it is sound");
     client.receive(&snapshot.bytes).expect("it is sound");
-    let options = DrawOptions { view: DebugView::Visibility, fade_s: 0.0, ..DrawOptions::default() };
+    let options = DrawOptions { view: DebugView::Visibility, fade_s: Some(0.0), ..DrawOptions::default() };
 
     // Nothing is ready: all is open.
     let open = picture(&gpu, &mut viewer, 0.0, 0.0, &options);
@@ -133,7 +133,7 @@ fn a_fade_goes_from_the_last_update_to_this_one() {
     let mut viewer = viewer(&gpu, &scene);
     let snapshot = server.join().expect("it can be encoded").expect("there is one");
     viewer.receive(&snapshot.bytes, 0.0).expect("it is sound");
-    let options = DrawOptions { view: DebugView::Visibility, fade_s: 0.5, ..DrawOptions::default() };
+    let options = DrawOptions { view: DebugView::Visibility, fade_s: Some(0.5), ..DrawOptions::default() };
     picture(&gpu, &mut viewer, 0.0, 0.0, &options);
     work_to_the_end(&mut viewer, usize::MAX);
     picture(&gpu, &mut viewer, 0.0, 9.0, &options);
@@ -171,7 +171,7 @@ fn every_view_and_method_draws_and_a_split_shows_both() {
     let mut pictures = Vec::new();
     use DebugView::{Age, Beauty, Error, Normal, Points, Texels, Visibility, Weights};
     for view in [Beauty, Visibility, Normal, Points, Texels, Weights, Age, Error] {
-        let options = DrawOptions { view, fade_s: 0.0, ..DrawOptions::default() };
+        let options = DrawOptions { view, fade_s: Some(0.0), ..DrawOptions::default() };
         let shown = picture(&gpu, &mut viewer, 0.5, 20.0, &options);
         assert!(shown.iter().any(|p| *p != shown[0]), "{view:?} shows one colour");
         assert!(pictures.iter().all(|other| *other != shown), "{view:?} looks like another view");
@@ -181,7 +181,7 @@ fn every_view_and_method_draws_and_a_split_shows_both() {
         view: Visibility,
         method,
         split,
-        fade_s: 0.0,
+        fade_s: Some(0.0),
         ..DrawOptions::default()
     };
     let mut shown = |options: DrawOptions| picture(&gpu, &mut viewer, 0.5, 20.0, &options);
