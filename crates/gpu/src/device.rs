@@ -141,8 +141,9 @@ impl Gpu {
         describe(&self.adapter)
     }
 
-    /// The first thing that went wrong on the device since this was last asked: a rejected call, memory, or the loss of
-    /// the device. Ask once a frame: whoever does not ask sees a black picture at worst, and why in the log.
+    /// The first thing that went wrong on the device since this was last asked: a rejected call or memory; or the loss of
+    /// the device, which everyone who asks is told from then on. Ask once a frame: whoever does not ask sees a black
+    /// picture at worst, and why in the log.
     pub fn take_fault(&self) -> Option<GpuFault> {
         self.faults.take()
     }

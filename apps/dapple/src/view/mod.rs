@@ -8,6 +8,7 @@ mod overlay;
 mod paint;
 mod picture;
 mod quality;
+mod retries;
 mod screen;
 mod session;
 mod show;
