@@ -303,6 +303,7 @@ impl GpuScene {
             }
         }
         self.instance_buffer.write(gpu, bytemuck::cast_slice(&self.raw));
+        self.pages.write(gpu);
         self.deformation.write_pose(gpu, &self.scene, pose);
         self.bounds.place(&self.scene, pose);
     }
