@@ -245,6 +245,7 @@ impl Core {
     /// Figures for an overlay; the names are those of `dapple.d.ts`.
     pub fn stats(&mut self, now_s: f64) -> JsValue {
         let stats = self.shown.as_ref().map(|shown| shown.viewer.stats()).unwrap_or_default();
+        let problem = self.shown.as_ref().and_then(|shown| shown.viewer.problem());
         let info = self.screen.gpu.adapter.get_info();
         let backend =
             if info.backend == dapple_gpu::wgpu::Backend::BrowserWebGpu { "webgpu" } else { "webgl2" };
@@ -269,6 +270,7 @@ impl Core {
             ("time", self.clock.time_s().into()),
             ("duration", self.clock.duration_s().into()),
             ("playing", self.clock.is_playing().into()),
+            ("problem", problem.map_or(JsValue::NULL, JsValue::from_str)),
         ])
     }
 

@@ -22,6 +22,8 @@ pub(super) struct Light {
     /// When the running fade began, seconds; long ago if none runs.
     fade_start_s: f64,
     pace: Pace,
+    /// Why this atlas cannot be shown.
+    problem: Option<String>,
 }
 
 impl Light {
@@ -35,6 +37,7 @@ impl Light {
             is_new: false,
             fade_start_s: f64::NEG_INFINITY,
             pace: Pace::default(),
+            problem: None,
         }
     }
 
@@ -49,6 +52,7 @@ impl Light {
         match &applied {
             Applied::NewLayout => {
                 self.is_new = true;
+                self.problem = None;
                 self.inspection.reset();
                 let cuts = self.subscriber.cuts();
                 self.atlas = self.subscriber.store().map(|store| {
@@ -102,13 +106,20 @@ impl Light {
         fade_at(self.fade_start_s, now_s, self.fade_s(fade_s))
     }
 
-    /// Brings onto the card what changed since the last call.
-    pub(super) fn upload(
-        &mut self,
-        gpu: &Gpu,
-        gpu_scene: &mut GpuScene,
-        now_s: f64,
-    ) -> Result<(), ForwardError> {
+    /// Why the atlas cannot be shown, if so: until there is another one.
+    pub(super) fn problem(&self) -> Option<&str> {
+        self.problem.as_deref()
+    }
+
+    /// Brings onto the card what changed since the last call. What fails is not tried again before another layout comes.
+    pub(super) fn upload(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene, now_s: f64) {
+        if self.problem.is_none() {
+            let uploaded = self.try_upload(gpu, gpu_scene, now_s);
+            self.problem = uploaded.err().map(|error| error.to_string());
+        }
+    }
+
+    fn try_upload(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene, now_s: f64) -> Result<(), ForwardError> {
         let Some(atlas) = &mut self.atlas else { return Ok(()) };
         if std::mem::take(&mut self.is_new) {
             for instance in 0..self.scene.instances.len() as u32 {

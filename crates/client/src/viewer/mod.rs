@@ -121,7 +121,8 @@ impl Viewer {
     }
 
     /// Draws the scene as it is at `scene_time_s` (its animation's time) into `target`, `width` × `height` pixels
-    /// large. `now_s` is the caller's clock, which the fade runs on.
+    /// large. `now_s` is the caller's clock, which the fade runs on. A look-up that cannot show the points is left out,
+    /// as if everything were open: [`Viewer::problem`].
     ///
     /// # Errors
     /// A camera or size that cannot be drawn, or a device that failed since the last picture.
@@ -137,10 +138,10 @@ impl Viewer {
         options: &DrawOptions,
     ) -> Result<(), ViewerError> {
         (self.now_s, self.fade_s) = (now_s, options.fade_s);
-        self.light.upload(gpu, &mut self.gpu_scene, now_s)?;
+        self.light.upload(gpu, &mut self.gpu_scene, now_s);
         let methods = [Some(options.method), options.split.map(|(_, method)| method)];
         if methods.contains(&Some(Method::PsaoPaper)) {
-            self.paper.prepare(gpu, &mut self.forward, self.light.subscriber.store())?;
+            self.paper.prepare(gpu, &mut self.forward, self.light.subscriber.store());
         }
         let wants_points = options.view == DebugView::Points;
         // Only where points are shown must the processor know where deforming meshes are.
@@ -152,14 +153,21 @@ impl Viewer {
         if wants_points {
             self.place_points(gpu, &pose);
         }
-        if let Some(atlas) = &self.light.atlas {
+        if let (Some(atlas), None) = (&self.light.atlas, self.light.problem()) {
             match options.view {
                 DebugView::Weights => self.light.inspection.show_weights(gpu, &mut self.gpu_scene, atlas)?,
                 DebugView::Age => self.light.inspection.show_ages(gpu, &mut self.gpu_scene, atlas, now_s)?,
                 _ => {}
             }
         }
-        let views = views(options, size, *camera, self.points.as_ref().map(|points| &points.on_card));
+        // What a look-up cannot show is open.
+        let lookup = |method| match method {
+            Method::Psao if self.light.problem().is_none() => LookupId::ATLAS,
+            Method::PsaoPaper if self.paper.problem().is_none() => paper::ID,
+            _ => LookupId::NONE,
+        };
+        let points = self.points.as_ref().map(|points| &points.on_card);
+        let views = views(options, size, *camera, points, &lookup);
         let inputs = FrameInputs {
             pose: &pose,
             shade: &self.config.shade,
@@ -197,6 +205,12 @@ impl Viewer {
         self.light.fade_s(options.fade_s)
     }
 
+    /// Why a look-up that was drawn with cannot show the points that there are: too many for the device or for the look-up's
+    /// structure. `None` if all is well; another layout, or another viewer, may do better.
+    pub fn problem(&self) -> Option<&str> {
+        self.light.problem().or(self.paper.problem())
+    }
+
     /// Figures for an overlay.
     pub fn stats(&self) -> ViewerStats {
         let store_bytes = self.stats.points as u64 * BYTES_A_STORED_POINT;
@@ -228,20 +242,13 @@ impl Viewer {
 /// Three coordinates, a normal and a value.
 const BYTES_A_STORED_POINT: u64 = 15;
 
-fn lookup(method: Method) -> LookupId {
-    match method {
-        Method::None => LookupId::NONE,
-        Method::Psao => LookupId::ATLAS,
-        Method::PsaoPaper => paper::ID,
-    }
-}
-
 /// The whole picture, and what lies right of the split over it.
 fn views<'a>(
     options: &DrawOptions,
     size: (u32, u32),
     camera: PosedCamera,
     points: Option<&'a GpuPoints>,
+    lookup: &dyn Fn(Method) -> LookupId,
 ) -> Vec<View<'a>> {
     let other = options.split.map_or(Method::None, |(_, method)| method);
     let kind = match options.view {

@@ -127,7 +127,4 @@ pub enum ViewerError {
     /// The device failed; after a loss nothing works until everything is made anew on another.
     #[error(transparent)]
     Fault(#[from] GpuFault),
-    /// The points do not fit the paper's structure.
-    #[error(transparent)]
-    Tables(#[from] dapple_render::psao::TableError),
 }

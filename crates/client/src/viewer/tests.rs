@@ -7,7 +7,8 @@ use dapple_gpu::{Gpu, read_texture, wgpu};
 use dapple_render::forward::Transparency;
 use dapple_scene::{NoFiles, PosedCamera, Scene, builtin};
 use dapple_server::{Server, ServerConfig};
-use dapple_stream::Limits;
+use dapple_store::points::{MAX_COORDINATE, PackedNormal, PointLayout, PointSet, PointStore};
+use dapple_stream::{Limits, Publisher, PublisherConfig};
 
 use super::{DebugView, DrawOptions, Method, Viewer, ViewerConfig};
 use crate::{Client, PictureParams, Reconstruction};
@@ -211,4 +212,45 @@ fn frames_of_another_scene_and_noise_change_nothing() {
     assert_eq!(viewer.stats().frames_received, 0);
     assert!(viewer.store().is_none());
     assert_eq!(viewer.work(1000).total, 0);
+}
+
+/// Two points as far apart as a layout allows, 1 m a step, spaced `spacing_m`.
+fn far_apart(spacing_m: f32) -> PointStore {
+    let set = PointSet {
+        positions: vec![[0; 3], [MAX_COORDINATE; 3]],
+        normals: vec![PackedNormal::default(); 2],
+        ..PointSet::default()
+    };
+    let layout = PointLayout::new(1.0, spacing_m, vec![set]).expect("points are in order");
+    PointStore::new(Arc::new(layout), vec![0; 2]).expect("one value a point")
+}
+
+#[test]
+fn a_look_up_that_fails_is_left_out_until_other_points_come() {
+    let Some(gpu) = gpu_for_tests() else { return };
+    let scene = atrium();
+    let mut viewer = viewer(&gpu, &scene);
+    let mut publisher = Publisher::new(scene.hash().0, PublisherConfig::default());
+    let mut publish = |store: &PointStore| publisher.publish(store).expect("memory suffices").expect("news");
+    let with = |method| DrawOptions {
+        view: DebugView::Visibility,
+        method,
+        fade_s: Some(0.0),
+        ..DrawOptions::default()
+    };
+    viewer.receive(&publish(&far_apart(1.0)).bytes, 0.0).expect("it is sound");
+    let open = picture(&gpu, &mut viewer, 0.0, 0.0, &with(Method::None));
+    assert_eq!(viewer.problem(), None);
+    // More cells than can be numbered.
+    for _ in 0..2 {
+        assert!(picture(&gpu, &mut viewer, 0.0, 0.0, &with(Method::PsaoPaper)) == open);
+        assert!(viewer.problem().is_some_and(|problem| problem.contains("cells")), "{:?}", viewer.problem());
+    }
+    let error = DrawOptions { view: DebugView::Error, ..with(Method::PsaoPaper) };
+    picture(&gpu, &mut viewer, 0.0, 0.0, &error);
+    // Wider cells are fewer.
+    viewer.receive(&publish(&far_apart(20_000.0)).bytes, 1.0).expect("it is sound");
+    assert_eq!(viewer.problem(), None);
+    picture(&gpu, &mut viewer, 0.0, 1.0, &with(Method::PsaoPaper));
+    assert_eq!(viewer.problem(), None);
 }
