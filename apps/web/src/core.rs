@@ -146,9 +146,9 @@ impl Core {
 
         let time_us = (self.clock.time_s() * 1e6).round() as u64;
         for frame in self.replay.frames_to(&self.recording, time_us) {
-            viewer.receive(&frame, now_s)?;
+            let applied = viewer.receive(&frame, now_s)?;
             self.bytes.add(now_s, frame.len() as f64);
-            self.points.add(now_s, f64::from(viewer.stats().changed));
+            self.points.add(now_s, f64::from(viewer.changed_by(&applied)));
             self.changed = true;
         }
         self.changed |= self.steering.advance(elapsed_s);

@@ -159,9 +159,9 @@ impl Show {
         if let Some(group) = group_of(frame) {
             self.next_group = self.next_group.max(group.saturating_add(1));
         }
-        self.viewer.receive(frame, now_s)?;
+        let applied = self.viewer.receive(frame, now_s)?;
         self.bytes.add(now_s, frame.len() as f64);
-        self.points.add(now_s, f64::from(self.viewer.stats().changed));
+        self.points.add(now_s, f64::from(self.viewer.changed_by(&applied)));
         Ok(())
     }
 

@@ -97,19 +97,25 @@ impl Viewer {
         self.stats.frames_received += 1;
         self.stats.last_frame_s = Some(now_s);
         self.stats.points = self.store().map_or(0, |store| store.layout().len() as u32);
+        self.stats.changed = self.changed_by(&applied);
         match &applied {
-            Applied::Changes(changes) => {
-                self.stats.changed = changes.len() as u32;
-                self.paper.apply(changes);
-            }
+            Applied::Changes(changes) => self.paper.apply(changes),
             Applied::NewLayout => {
                 self.paper.forget();
-                self.stats.changed = self.stats.points;
                 self.points = None;
             }
             Applied::Ignored(_) => {}
         }
         Ok(applied)
+    }
+
+    /// How many points a frame has changed that was just taken, by what [`Viewer::receive`] gave: all for a new layout.
+    pub fn changed_by(&self, applied: &Applied) -> u32 {
+        match applied {
+            Applied::NewLayout => self.stats.points,
+            Applied::Changes(changes) => changes.len() as u32,
+            Applied::Ignored(_) => 0,
+        }
     }
 
     /// Goes on with the work that a snapshot causes (charts, weights), about `texels` texels of it (some 100,000 a
@@ -211,7 +217,7 @@ impl Viewer {
         self.light.problem().or(self.paper.problem())
     }
 
-    /// Figures for an overlay.
+    /// Figures for an overlay. Looks at all that is held: a few times a second is enough.
     pub fn stats(&self) -> ViewerStats {
         let store_bytes = self.stats.points as u64 * BYTES_A_STORED_POINT;
         let (atlas_bytes, texels) =
