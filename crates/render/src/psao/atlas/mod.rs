@@ -20,7 +20,7 @@ use dapple_store::charts::{
 use dapple_store::points::PointLayout;
 
 pub use dapple_store::charts::Placement;
-pub use pages::DirtyBand;
+pub use pages::{DirtyBand, MAX_LAYERS};
 pub use upload::TexelInfo;
 
 use pages::{Pages, PlacedPages};
@@ -33,11 +33,16 @@ pub struct AtlasParams {
     pub weights: WeightParams,
     /// Factor on the edge of texels, > 0. Default 1: [`ChartParams::for_spacing`].
     pub texel_factor: f32,
+    /// Most texels of all instances together, gaps between pages not counted: an instance beyond stays open
+    /// ([`VisibilityAtlas::failed`]). Texels are as fine as the layout says that points are dense, and a layout comes from
+    /// outside: this bounds the memory that it can ask for, some 10 bytes a texel and 60 more while an instance is made.
+    /// Default `None`: 16 a point, and 2²⁰ more; 4 a point are common.
+    pub max_texels: Option<u64>,
 }
 
 impl Default for AtlasParams {
     fn default() -> Self {
-        AtlasParams { weights: WeightParams::default(), texel_factor: 1.0 }
+        AtlasParams { weights: WeightParams::default(), texel_factor: 1.0, max_texels: None }
     }
 }
 
@@ -80,6 +85,8 @@ pub struct VisibilityAtlas {
     queue: Vec<usize>,
     job: Option<Job>,
     done: u64,
+    /// Of the sets that are ready.
+    texels: u64,
     pages: Pages,
     /// Instances that became ready since they were last asked for.
     ready: Vec<u32>,
@@ -99,6 +106,17 @@ pub enum BuildError {
     /// There is no room for its texels.
     #[error(transparent)]
     Atlas(#[from] AtlasError),
+    /// It has more texels than are left of what all instances may have.
+    #[error(
+        "atlas: {needed} texels with those of the instances before, at most {limit} may be; texels follow the layout's \
+         spacing, which does not fit its number of points"
+    )]
+    TooManyTexels {
+        /// Texels that there would be.
+        needed: u64,
+        /// [`AtlasParams::max_texels`].
+        limit: u64,
+    },
 }
 
 enum SetState {
@@ -142,6 +160,10 @@ const TRIANGLES_A_TEXEL: usize = 2;
 const ENCODED_A_TEXEL: usize = 16;
 const SUMMED_A_TEXEL: usize = 16;
 
+/// Most texels: so many for each point, and some for small meshes with few points.
+const TEXELS_A_POINT: u64 = 16;
+const SPARE_TEXELS: u64 = 1 << 20;
+
 impl VisibilityAtlas {
     /// An atlas in which everything is still open. `scene` must be the one that the layout was made for; `cuts` are left
     /// out where they do not fit its charts.
@@ -166,6 +188,7 @@ impl VisibilityAtlas {
             queue,
             job: None,
             done: 0,
+            texels: 0,
             pages,
             ready: Vec::new(),
             fresh: Vec::new(),
@@ -256,7 +279,19 @@ impl VisibilityAtlas {
                 }
             }
         };
+        // Before anything is made that grows with them.
+        let sides = if scene.is_two_sided(mesh) { 2 } else { 1 };
+        let (needed, limit) = (self.texels + sides * u64::from(charts.texel_count()), self.max_texels());
+        if needed > limit {
+            self.failed.push((instance_index, BuildError::TooManyTexels { needed, limit }));
+            return (None, cost);
+        }
         (Some(Job { set, charts, charts_key: key, stage: Stage::Sites }), cost)
+    }
+
+    fn max_texels(&self) -> u64 {
+        let of_points = TEXELS_A_POINT * self.layout.len() as u64 + SPARE_TEXELS;
+        self.params.max_texels.unwrap_or(of_points)
     }
 
     /// One step of a job, at most `budget` texels of it where it can be cut; gives what it cost.
@@ -337,6 +372,7 @@ impl VisibilityAtlas {
                 return;
             }
         };
+        self.texels += sums.len() as u64;
         let placed = PlacedPages::new(&charts, &placements, self.pages.side());
         for ((first, size), placement) in placed.firsts().zip(charts.pages().iter().cycle()).zip(&placements)
         {

@@ -16,8 +16,8 @@ pub struct DirtyBand {
 /// Sides of layers, texels. No page is longer than the smaller.
 const SIDES: [u16; 2] = [1024, 2048];
 
-/// As many as every graphics card takes.
-const MOST_LAYERS: u16 = 256;
+/// Most layers of an atlas: every graphics card takes 256, and a texture may get one more than are wanted of it.
+pub const MAX_LAYERS: u16 = 255;
 
 /// Texels a point, gaps between pages counted, by which the side is chosen.
 const TEXELS_A_POINT: usize = 4;
@@ -44,7 +44,7 @@ impl Pages {
     pub(super) fn for_points(points: usize) -> Pages {
         let wanted = points * TEXELS_A_POINT;
         let side = if wanted <= usize::from(SIDES[0]).pow(2) { SIDES[0] } else { SIDES[1] };
-        let places = Atlas::new(side, MOST_LAYERS);
+        let places = Atlas::new(side, MAX_LAYERS);
         let side = u32::from(side);
         Pages { side, texels: Vec::new(), dirty: Vec::new(), listed: Vec::new(), places }
     }

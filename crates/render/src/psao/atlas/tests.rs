@@ -298,6 +298,33 @@ fn updates_that_come_before_a_fade_ends_do_not_jump() {
 }
 
 #[test]
+fn instances_beyond_the_bound_of_texels_stay_open() {
+    let scene = stage();
+    let layout = lay(&scene, 0.1);
+    let make = |layout: &Arc<PointLayout>, max_texels| {
+        let params = AtlasParams { max_texels, ..AtlasParams::default() };
+        let mut atlas = VisibilityAtlas::new(layout.clone(), &scene, None, params);
+        while !atlas.work(&scene, &vec![0; layout.len()], usize::MAX).is_complete() {}
+        atlas
+    };
+    let is_refused = |(_, error): &(u32, BuildError)| matches!(error, BuildError::TooManyTexels { .. });
+    let none = make(&layout, Some(0));
+    assert!(none.failed().len() == 4 && none.failed().iter().all(is_refused), "{:?}", none.failed());
+    assert_eq!((none.ready_count(), none.texel_count()), (0, 0));
+    assert_eq!(none.visibility(0, 0, [0.3, 0.3], false, 1.0), 1.0);
+    // Exactly as many as there are suffice, and one less does not for the last.
+    let all: u64 = (0..4).map(|i| u64::from(make(&layout, None).charts(i).unwrap().texel_count())).sum();
+    assert!(make(&layout, Some(all)).failed().is_empty());
+    assert_eq!(make(&layout, Some(all - 1)).failed().len(), 1);
+    // What a layout says of its spacing asks for no more than its points are worth.
+    let sets = layout.sets().to_vec();
+    let fine = Arc::new(PointLayout::new(layout.quantum_m(), 1e-5, sets).unwrap());
+    let atlas = make(&fine, None);
+    assert!(!atlas.failed().is_empty() && atlas.failed().iter().all(is_refused), "{:?}", atlas.failed());
+    assert!(atlas.memory_bytes() < 100 << 20, "{} bytes", atlas.memory_bytes());
+}
+
+#[test]
 fn mirrored_and_flat_instances_do_no_harm() {
     let mut stage = Stage::new();
     stage.add(cube(), 0, Affine3A::from_scale(Vec3::new(-0.5, 0.5, 0.5)));
