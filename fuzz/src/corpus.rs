@@ -4,7 +4,9 @@
 mod scenes;
 
 use dapple_store::points::{Change, PointStore};
-use dapple_stream::{Frame, FrameHeader, FrameKind, Limits, Publisher, PublisherConfig};
+use dapple_stream::{
+    Frame, FrameHeader, FrameKind, Limits, Publisher, PublisherConfig, Recorder, RecordingHeader,
+};
 
 use crate::input::{Input, Random};
 
@@ -38,9 +40,11 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
     };
     let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
     let mut store = sample();
-    frame("snapshot", &publish(&mut publisher, &store));
+    let snapshot = publish(&mut publisher, &store);
+    frame("snapshot", &snapshot);
     store.apply(&[Change { point: 17, visibility: 3 }]).expect("it exists");
-    frame("delta-of-one", &publish(&mut publisher, &store));
+    let delta = publish(&mut publisher, &store);
+    frame("delta-of-one", &delta);
     let mut all = Publisher::new([0; 32], PublisherConfig::default());
     publish(&mut all, &sample());
     let inverse = sample().visibility().iter().map(|v| v ^ 0x55).collect();
@@ -63,7 +67,26 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
     calls.extend([1, 1, 0, 1, 0, 77, 3, 0, 0, 64, 7, 1, 0, 5, 1, 0, 1, 0]);
     seeds.push(("session_ops", "each-call".to_owned(), calls));
 
+    for (name, frames) in [
+        ("empty", &[][..]),
+        ("group", &[(0, &snapshot), (500_000, &delta)][..]),
+        ("two-groups", &[(0, &snapshot), (500_000, &delta), (1_250_000, &snapshot), (2_000_000, &delta)][..]),
+    ] {
+        seeds.push(("read_recording", name.to_owned(), recording(name, frames)));
+    }
+
     let scenes = [("scene.glb", scenes::glb()), ("scene.gltf", scenes::gltf()), ("scene.obj", scenes::obj())];
     seeds.extend(scenes.map(|(name, bytes)| ("load_scene", name.to_owned(), bytes)));
     seeds
+}
+
+/// A recording of two seconds of frames at their times.
+fn recording(name: &str, frames: &[(u64, &Frame)]) -> Vec<u8> {
+    let header = RecordingHeader { scene_hash: [0; 32], name: name.to_owned(), duration_us: 2_000_000 };
+    let (mut recorder, mut bytes) = Recorder::new(&header).expect("it is short");
+    for (time_us, frame) in frames {
+        bytes.extend(recorder.frame(*time_us, &frame.bytes).expect("frames are in order"));
+    }
+    bytes.extend(recorder.finish());
+    bytes
 }

@@ -6,11 +6,13 @@
 pub mod corpus;
 mod frame;
 mod input;
+mod recording;
 mod scene;
 mod session;
 
 pub use frame::decode_frame;
 pub use input::Random;
+pub use recording::read_recording;
 pub use scene::load_scene;
 pub use session::session_ops;
 
@@ -18,5 +20,9 @@ pub use session::session_ops;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 3] =
-    [("decode_frame", decode_frame), ("session_ops", session_ops), ("load_scene", load_scene)];
+pub const TARGETS: [Target; 4] = [
+    ("decode_frame", decode_frame),
+    ("session_ops", session_ops),
+    ("read_recording", read_recording),
+    ("load_scene", load_scene),
+];

@@ -73,7 +73,7 @@ export interface Options {
   loop?: boolean;
   /** Default false. */
   paused?: boolean;
-  /** Seconds that an update fades in over, 0 to 10. Default 1/15. */
+  /** Seconds that an update fades in over, 0 to 10. Default: as long as updates are apart, at most half a second. */
   fade?: number;
   /** Pointer, wheel, touch and keys steer the camera. Default true. */
   controls?: boolean;

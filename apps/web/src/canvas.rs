@@ -107,7 +107,11 @@ impl Screen {
                 self.surface.configure(&self.gpu.device, &self.config);
                 return Ok(false);
             }
-            CurrentSurfaceTexture::Validation => return Err("the canvas cannot be drawn to".to_owned()),
+            CurrentSurfaceTexture::Validation => {
+                // It may be the first that is heard of a lost device.
+                let fault = self.gpu.take_fault();
+                return Err(fault.map_or("the canvas cannot be drawn to".to_owned(), |f| f.to_string()));
+            }
         };
         let view = texture.texture.create_view(&wgpu::TextureViewDescriptor::default());
         draw(&self.gpu, &view).map_err(|error| error.to_string())?;

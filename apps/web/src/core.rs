@@ -158,16 +158,16 @@ impl Core {
 
         let time_us = (self.clock.time_s() * 1e6).round() as u64;
         for frame in self.replay.frames_to(&self.recording, time_us) {
-            viewer.receive(&frame, now_s)?;
+            let applied = viewer.receive(&frame, now_s)?;
             self.bytes.add(now_s, frame.len() as f64);
-            self.points.add(now_s, f64::from(viewer.stats().changed));
+            self.points.add(now_s, f64::from(viewer.changed_by(&applied)));
             self.changed = true;
         }
         self.changed |= self.steering.advance(elapsed_s);
         // The last of it fades in.
         self.changed |= self.has_new_light && self.progress.is_complete();
         if self.changed {
-            self.draw_until_s = now_s + LINGER_S + f64::from(self.options.fade_s);
+            self.draw_until_s = now_s + LINGER_S + f64::from(viewer.fade_s(&self.options));
         }
         let shows_light = self.has_new_light && now_s - self.drawn_s >= LOADING_PICTURE_S;
         if now_s > self.draw_until_s && self.options.view != DebugView::Age && !shows_light {
@@ -240,10 +240,10 @@ impl Core {
         self.changed = true;
     }
 
-    /// Seconds that an update fades in over; 0 for none.
+    /// Seconds that an update fades in over; 0 for none. Until this is called, as long as updates are apart.
     #[wasm_bindgen(js_name = setFade)]
     pub fn set_fade(&mut self, fade_s: f32) {
-        self.options.fade_s = if fade_s.is_finite() { fade_s.clamp(0.0, 10.0) } else { 0.0 };
+        self.options.fade_s = Some(if fade_s.is_finite() { fade_s.clamp(0.0, 10.0) } else { 0.0 });
         self.changed = true;
     }
 
@@ -261,6 +261,7 @@ impl Core {
     /// Figures for an overlay; the names are those of `dapple.d.ts`.
     pub fn stats(&mut self, now_s: f64) -> JsValue {
         let stats = self.shown.as_ref().map(|shown| shown.viewer.stats()).unwrap_or_default();
+        let problem = self.shown.as_ref().and_then(|shown| shown.viewer.problem());
         let info = self.screen.gpu.adapter.get_info();
         let backend =
             if info.backend == dapple_gpu::wgpu::Backend::BrowserWebGpu { "webgpu" } else { "webgl2" };
@@ -285,6 +286,7 @@ impl Core {
             ("time", self.clock.time_s().into()),
             ("duration", self.clock.duration_s().into()),
             ("playing", self.clock.is_playing().into()),
+            ("problem", problem.map_or(JsValue::NULL, JsValue::from_str)),
         ])
     }
 

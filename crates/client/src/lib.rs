@@ -7,6 +7,7 @@
 
 pub mod clock;
 pub mod controls;
+pub mod pace;
 pub mod rate;
 #[cfg(feature = "gpu")]
 pub mod viewer;
@@ -95,7 +96,7 @@ impl Client {
         match (&applied, self.atlas.get_mut()) {
             (Applied::NewLayout, _) => (self.index, self.atlas) = (OnceLock::new(), OnceLock::new()),
             (Applied::Changes(changes), Some(atlas)) => {
-                atlas.begin_update();
+                atlas.begin_update(1.0);
                 atlas.apply(changes.iter().map(|c| PointChange { point: c.point, old: c.old, new: c.new }));
             }
             _ => {}

@@ -33,6 +33,17 @@ pub enum GpuError {
         /// Whether it had to present to a surface.
         has_surface: bool,
     },
+    /// The variable WGPU_ADAPTER_NAME asks for an adapter that there is not.
+    #[error(
+        "gpu: no graphics adapter has {wanted:?} in its name, as the variable WGPU_ADAPTER_NAME asks; there is {found}. \
+         Set it to a part of one of these names, or unset it"
+    )]
+    NoSuchAdapter {
+        /// What the variable says.
+        wanted: String,
+        /// The adapters there are, or `none`.
+        found: String,
+    },
     /// The adapter has less than every pass needs.
     #[error(
         "gpu: {adapter} is too small: {missing}. At least what WebGL2 guarantees is needed; update the driver, or choose \
@@ -81,13 +92,20 @@ impl Gpu {
     /// raised to the adapter's where passes make use of more: sizes and layers of textures, sizes of buffers, storage
     /// buffers.
     ///
+    /// Outside of browsers the environment variable `WGPU_ADAPTER_NAME` chooses the first adapter with this text in its
+    /// name, in letters of either case, whatever `options` prefer.
+    ///
     /// # Errors
-    /// No adapter, one that is too small, or one that refuses; each says what to do.
+    /// No adapter, none of that name, one that is too small, or one that refuses; each says what to do.
     pub async fn request(
         instance: &wgpu::Instance,
         surface: Option<&wgpu::Surface<'_>>,
         options: &GpuOptions,
     ) -> Result<Gpu, GpuError> {
+        #[cfg(not(target_arch = "wasm32"))]
+        if let Some(wanted) = std::env::var("WGPU_ADAPTER_NAME").ok().filter(|wanted| !wanted.is_empty()) {
+            return Gpu::from_adapter(named_adapter(instance, surface, wanted).await?).await;
+        }
         let power_preference = if options.high_performance {
             wgpu::PowerPreference::HighPerformance
         } else {
@@ -141,8 +159,9 @@ impl Gpu {
         describe(&self.adapter)
     }
 
-    /// The first thing that went wrong on the device since this was last asked: a rejected call, memory, or the loss of
-    /// the device. Ask once a frame: whoever does not ask sees a black picture at worst, and why in the log.
+    /// The first thing that went wrong on the device since this was last asked: a rejected call or memory; or the loss of
+    /// the device, which everyone who asks is told from then on. Ask once a frame: whoever does not ask sees a black
+    /// picture at worst, and why in the log.
     pub fn take_fault(&self) -> Option<GpuFault> {
         self.faults.take()
     }
@@ -157,6 +176,35 @@ impl Gpu {
     pub fn has_view_formats(&self) -> bool {
         self.adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::VIEW_FORMATS)
     }
+}
+
+/// The first adapter with a text in its name that can present to the surface.
+#[cfg(not(target_arch = "wasm32"))]
+async fn named_adapter(
+    instance: &wgpu::Instance,
+    surface: Option<&wgpu::Surface<'_>>,
+    wanted: String,
+) -> Result<wgpu::Adapter, GpuError> {
+    let mut adapters = instance.enumerate_adapters(wgpu::Backends::all()).await;
+    adapters.retain(|adapter| surface.is_none_or(|surface| adapter.is_surface_supported(surface)));
+    let names: Vec<String> = adapters.iter().map(|adapter| adapter.get_info().name).collect();
+    match position_of(&names, &wanted) {
+        Some(at) => Ok(adapters.swap_remove(at)),
+        None => Err(no_such_adapter(wanted, &adapters.iter().map(describe).collect::<Vec<_>>())),
+    }
+}
+
+/// The first name with this text in it, in letters of either case.
+#[cfg(not(target_arch = "wasm32"))]
+fn position_of(names: &[String], wanted: &str) -> Option<usize> {
+    let wanted = wanted.to_lowercase();
+    names.iter().position(|name| name.to_lowercase().contains(&wanted))
+}
+
+#[cfg(not(target_arch = "wasm32"))]
+fn no_such_adapter(wanted: String, found: &[String]) -> GpuError {
+    let found = if found.is_empty() { "none".to_owned() } else { found.join("; ") };
+    GpuError::NoSuchAdapter { wanted, found }
 }
 
 fn describe(adapter: &wgpu::Adapter) -> String {
@@ -178,4 +226,21 @@ fn describe(adapter: &wgpu::Adapter) -> String {
     }
     line.push(')');
     line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn adapters_are_chosen_by_a_part_of_their_name() {
+        let names = ["NVIDIA GeForce RTX 4070", "llvmpipe (LLVM 19.1)", "LLVMpipe again"].map(str::to_owned);
+        for (wanted, at) in [("llvmpipe", 1), ("LlvmPipe", 1), ("rtx", 0), ("again", 2)] {
+            assert_eq!(position_of(&names, wanted), Some(at), "{wanted}");
+        }
+        assert_eq!(position_of(&names, "radeon"), None);
+        let message = no_such_adapter("radeon".to_owned(), &names).to_string();
+        assert!(message.contains("radeon") && message.contains("RTX 4070; llvmpipe"), "{message}");
+        assert!(no_such_adapter("radeon".to_owned(), &[]).to_string().contains("there is none"));
+    }
 }

@@ -16,7 +16,7 @@ pub enum GpuFault {
     Rejected(String),
 }
 
-/// The first fault of a device that nobody has asked for yet.
+/// The first fault of a device that nobody has asked for yet, and its loss for good.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Faults(Arc<Mutex<Option<GpuFault>>>);
 
@@ -45,14 +45,20 @@ impl Faults {
 
     fn put(&self, fault: GpuFault) {
         let mut first = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        // A loss causes many rejections, and says more than they do.
-        if first.is_none() || matches!(fault, GpuFault::Lost(_)) {
+        // A loss causes many rejections, and says more than they do. The first one says why.
+        let is_lost = matches!(*first, Some(GpuFault::Lost(_)));
+        if first.is_none() || (matches!(fault, GpuFault::Lost(_)) && !is_lost) {
             *first = Some(fault);
         }
     }
 
+    /// The fault, which is then forgotten; a loss never is, because it never passes.
     pub(crate) fn take(&self) -> Option<GpuFault> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
+        let mut first = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*first {
+            Some(GpuFault::Lost(_)) => first.clone(),
+            _ => first.take(),
+        }
     }
 }
 
@@ -65,4 +71,25 @@ fn chain(error: &dyn std::error::Error) -> String {
         source = error.source();
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_loss_is_told_to_everyone_and_other_faults_once() {
+        let faults = Faults::default();
+        assert_eq!(faults.take(), None);
+        let rejected = |text: &str| GpuFault::Rejected(text.to_owned());
+        faults.put(rejected("first"));
+        faults.put(rejected("second"));
+        assert_eq!([faults.take(), faults.take()], [Some(rejected("first")), None]);
+        faults.put(rejected("because of the loss"));
+        faults.put(GpuFault::Lost("unplugged".to_owned()));
+        faults.put(GpuFault::Lost("again".to_owned()));
+        faults.put(rejected("later"));
+        let lost = Some(GpuFault::Lost("unplugged".to_owned()));
+        assert_eq!([faults.take(), faults.clone().take()], [lost.clone(), lost]);
+    }
 }

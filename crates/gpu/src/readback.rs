@@ -102,7 +102,10 @@ async fn map(gpu: &Gpu, staging: &wgpu::Buffer) -> Result<Vec<u8>, ReadError> {
     let sender = signal.clone();
     staging.map_async(wgpu::MapMode::Read, .., move |result| sender.set(result.map_err(|e| e.to_string())));
     // Native devices work when they are polled; browsers on their own, and there this does nothing.
-    gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| ReadError::Map(e.to_string()))?;
+    if let Err(error) = gpu.device.poll(wgpu::PollType::wait_indefinitely()) {
+        // Waiting fails because of what went wrong before.
+        return Err(gpu.take_fault().map_or_else(|| ReadError::Map(error.to_string()), ReadError::Fault));
+    }
     let mapped = signal.await;
     if let Some(fault) = gpu.take_fault() {
         return Err(fault.into());

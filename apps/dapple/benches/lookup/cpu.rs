@@ -62,7 +62,7 @@ pub(crate) fn measure(scene: &Scene, store: &Arc<PointStore>, rounds: usize) -> 
                 })
                 .collect();
             let one = time(|| {
-                atlas.begin_update();
+                atlas.begin_update(1.0);
                 atlas.apply(changes);
             });
             took.push(one.wall_ms);

@@ -53,7 +53,7 @@ pub(crate) struct ViewArgs {
     /// The other method of a split picture.
     #[arg(long, value_enum, default_value = "none")]
     pub(crate) other: ViewMethod,
-    /// Seconds that an update fades in over; 0 for none [default: 1/15; 0 with --headless].
+    /// Seconds that an update fades in over; 0 for none [default: as long as updates are apart, at most half a second; 0 with --headless].
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) fade: Option<f32>,
     /// A camera of the scene by name, or one given as eye=X,Y,Z,target=X,Y,Z,fov=DEGREES (vertical)

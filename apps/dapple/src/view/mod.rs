@@ -8,6 +8,7 @@ mod overlay;
 mod paint;
 mod picture;
 mod quality;
+mod retries;
 mod screen;
 mod session;
 mod show;
@@ -87,7 +88,8 @@ fn open(args: &ViewArgs) -> Result<Opening> {
     };
     let steering = Steering::new(&scene, args.camera.as_deref(), args.time)?;
     let usual = DrawOptions::default();
-    let fade_s = args.fade.unwrap_or(if args.headless { 0.0 } else { usual.fade_s });
+    // Pictures in files show updates as they come.
+    let fade_s = args.fade.or(if args.headless { Some(0.0) } else { usual.fade_s });
     // The error is that between two methods, side by side or not.
     let other = args.other.into();
     let split = match args.split {

@@ -98,7 +98,9 @@ impl Overlay {
             self.notice = None;
         }
         let preparing = show.feed.preparing();
-        if self.notice.is_none() && preparing.is_none() && self.failure.is_none() {
+        // What stays as it is until something else is shown.
+        let lasting = [self.failure.as_deref(), show.problem()];
+        if self.notice.is_none() && preparing.is_none() && lasting == [None; 2] {
             return;
         }
         egui::Area::new(egui::Id::unique("messages"))
@@ -110,8 +112,8 @@ impl Overlay {
                         let bar = egui::ProgressBar::new(part).desired_width(240.0);
                         ui.add(bar.text(format!("{what} {:.0} %", 100.0 * part)));
                     }
-                    if let Some(failure) = &self.failure {
-                        ui.label(RichText::new(failure).color(Color32::LIGHT_RED));
+                    for text in lasting.into_iter().flatten() {
+                        ui.label(RichText::new(text).color(Color32::LIGHT_RED));
                     }
                     if let Some((text, _)) = &self.notice {
                         ui.label(text);

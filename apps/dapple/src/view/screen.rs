@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, bail};
 use dapple_gpu::wgpu::{self, CurrentSurfaceTexture, TextureFormat};
-use dapple_gpu::{Gpu, GpuOptions};
+use dapple_gpu::{Gpu, GpuFault, GpuOptions};
 use winit::event_loop::ActiveEventLoop;
 use winit::window::Window;
 
@@ -12,6 +12,7 @@ use winit::window::Window;
 pub(super) struct Screen {
     pub(super) gpu: Gpu,
     pub(super) window: Arc<Window>,
+    instance: wgpu::Instance,
     surface: wgpu::Surface<'static>,
     config: wgpu::SurfaceConfiguration,
     /// What pictures are written as: plain, because the viewer encodes by itself.
@@ -22,6 +23,20 @@ pub(super) struct Screen {
 pub(super) struct Canvas {
     texture: wgpu::SurfaceTexture,
     pub(super) view: wgpu::TextureView,
+}
+
+/// What there is to draw to.
+pub(super) enum Next {
+    /// A picture.
+    Canvas(Canvas),
+    /// Nothing now, the system wants none.
+    Nothing,
+    /// Nothing now, and soon again: the surface was set up anew for its window.
+    Again,
+    /// Nothing: the surface is lost, but for all one knows not the device. [`Screen::renew_surface`] makes another.
+    SurfaceLost,
+    /// Nothing: the device failed.
+    Fault(GpuFault),
 }
 
 impl Screen {
@@ -57,7 +72,7 @@ impl Screen {
             view_formats: if format == chosen { Vec::new() } else { vec![format] },
         };
         surface.configure(&gpu.device, &config);
-        Ok(Screen { gpu, window, surface, config, format })
+        Ok(Screen { gpu, window, instance, surface, config, format })
     }
 
     /// Format of what is drawn to.
@@ -80,21 +95,43 @@ impl Screen {
         }
     }
 
-    /// The next picture to draw; none if the system wants none now.
-    pub(super) fn next(&self) -> Result<Option<Canvas>> {
+    /// The next picture to draw.
+    ///
+    /// # Errors
+    /// A surface that refuses although the device is sound.
+    pub(super) fn next(&self) -> Result<Next> {
         let texture = match self.surface.get_current_texture() {
             CurrentSurfaceTexture::Success(texture) | CurrentSurfaceTexture::Suboptimal(texture) => texture,
-            CurrentSurfaceTexture::Timeout | CurrentSurfaceTexture::Occluded => return Ok(None),
-            CurrentSurfaceTexture::Outdated | CurrentSurfaceTexture::Lost => {
+            CurrentSurfaceTexture::Timeout | CurrentSurfaceTexture::Occluded => return Ok(Next::Nothing),
+            CurrentSurfaceTexture::Outdated => {
                 self.surface.configure(&self.gpu.device, &self.config);
-                return Ok(None);
+                return Ok(Next::Again);
             }
-            CurrentSurfaceTexture::Validation => bail!("the window cannot be drawn to any more"),
+            // Both may be the first that is heard of a lost device.
+            CurrentSurfaceTexture::Lost => {
+                return Ok(self.gpu.take_fault().map_or(Next::SurfaceLost, Next::Fault));
+            }
+            CurrentSurfaceTexture::Validation => match self.gpu.take_fault() {
+                Some(fault) => return Ok(Next::Fault(fault)),
+                None => bail!("the window cannot be drawn to any more"),
+            },
         };
         let view = texture
             .texture
             .create_view(&wgpu::TextureViewDescriptor { format: Some(self.format), ..Default::default() });
-        Ok(Some(Canvas { texture, view }))
+        Ok(Next::Canvas(Canvas { texture, view }))
+    }
+
+    /// Makes another surface for the window, on the same device.
+    ///
+    /// # Errors
+    /// A window that cannot be drawn to any more.
+    pub(super) fn renew_surface(&mut self) -> Result<()> {
+        let window = self.window.clone();
+        self.surface =
+            self.instance.create_surface(window).context("the window cannot be drawn to any more")?;
+        self.surface.configure(&self.gpu.device, &self.config);
+        Ok(())
     }
 
     /// Shows a picture that was drawn.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use dapple_client::viewer::{DebugView, Method, ViewerError};
 use dapple_gpu::GpuFault;
 use dapple_scene::glam::Vec3;
@@ -16,7 +16,8 @@ use super::overlay::{Overlay, Wish};
 use super::paint::Painter;
 use super::picture;
 use super::quality::{METHODS, Quality, VIEWS, next_of};
-use super::screen::Screen;
+use super::retries::Retries;
+use super::screen::{Next, Screen};
 use super::show::{Opening, Show};
 use crate::picture::write_png;
 
@@ -61,7 +62,8 @@ pub(super) struct Session {
     /// Clock up to which pictures are drawn.
     draw_until_s: f64,
     drawn_s: f64,
-    lost: u32,
+    /// Devices and surfaces that were made anew.
+    retries: Retries,
 }
 
 #[derive(Default)]
@@ -88,7 +90,7 @@ impl Session {
             held: [false; 6],
             draw_until_s: 1.0,
             drawn_s: f64::NEG_INFINITY,
-            lost: 0,
+            retries: Retries::default(),
         })
     }
 
@@ -123,7 +125,7 @@ impl Session {
     }
 
     fn linger(&mut self, now_s: f64) {
-        self.draw_until_s = now_s + LINGER_S + f64::from(self.show.options.fade_s);
+        self.draw_until_s = now_s + LINGER_S + f64::from(self.show.fade_s());
     }
 
     /// Draws and shows the present.
@@ -131,7 +133,16 @@ impl Session {
         if let Some(fault) = self.screen.gpu.take_fault() {
             return self.mend(event_loop, fault, now_s);
         }
-        let Some(canvas) = self.screen.next()? else { return Ok(()) };
+        let canvas = match self.screen.next()? {
+            Next::Canvas(canvas) => canvas,
+            Next::Nothing => return Ok(()),
+            Next::Again => {
+                self.linger(now_s);
+                return Ok(());
+            }
+            Next::SurfaceLost => return self.renew_surface(now_s),
+            Next::Fault(fault) => return self.mend(event_loop, fault, now_s),
+        };
         let size = self.screen.size();
         if let Err(error) = self.show.draw(&self.screen.gpu, &canvas.view, size, now_s) {
             return match error.downcast::<ViewerError>() {
@@ -160,12 +171,23 @@ impl Session {
         Ok(())
     }
 
-    /// After a fault of the device: goes on where nothing was lost, else with a new device, once.
+    /// Goes on with another surface after the window's was lost.
+    fn renew_surface(&mut self, now_s: f64) -> Result<()> {
+        if !self.retries.allow(now_s) {
+            bail!("the window's surface is lost again and again");
+        }
+        tracing::warn!("the window's surface was lost; drawing goes on with a new one");
+        self.screen.renew_surface()?;
+        self.linger(now_s);
+        Ok(())
+    }
+
+    /// After the loss of the device goes on with a new one, unless it is lost again and again. Other faults are mistakes
+    /// of the program, or memory that is not there, and end it.
     fn mend(&mut self, event_loop: &ActiveEventLoop, fault: GpuFault, now_s: f64) -> Result<()> {
         match fault {
-            GpuFault::Lost(_) if self.lost == 0 => {
+            GpuFault::Lost(_) if self.retries.allow(now_s) => {
                 tracing::warn!("{fault}");
-                self.lost += 1;
                 self.screen = Screen::open(event_loop, self.screen.window.clone())
                     .context("the graphics device was lost, and there is no other")?;
                 self.show.move_to(&self.screen.gpu, self.screen.format())?;

@@ -44,6 +44,8 @@ pub(super) struct Show {
     points: Rate,
     pictures: Rate,
     last_s: Option<f64>,
+    /// The problem of the viewer that was logged last.
+    logged: Option<String>,
 }
 
 /// Figures for an overlay.
@@ -90,6 +92,7 @@ impl Show {
             points: Rate::default(),
             pictures: Rate::default(),
             last_s: None,
+            logged: None,
         })
     }
 
@@ -156,9 +159,9 @@ impl Show {
         if let Some(group) = group_of(frame) {
             self.next_group = self.next_group.max(group.saturating_add(1));
         }
-        self.viewer.receive(frame, now_s)?;
+        let applied = self.viewer.receive(frame, now_s)?;
         self.bytes.add(now_s, frame.len() as f64);
-        self.points.add(now_s, f64::from(self.viewer.stats().changed));
+        self.points.add(now_s, f64::from(self.viewer.changed_by(&applied)));
         Ok(())
     }
 
@@ -183,7 +186,24 @@ impl Show {
         let time_s = self.clock.time_s();
         let camera = self.steering.camera(&self.scene, time_s);
         self.viewer.draw(gpu, target, size, &camera, time_s, now_s, &self.options)?;
+        let problem = self.viewer.problem();
+        if problem != self.logged.as_deref() {
+            if let Some(problem) = problem {
+                tracing::warn!("{problem}; drawing goes on without it");
+            }
+            self.logged = problem.map(str::to_owned);
+        }
         Ok(())
+    }
+
+    /// Why a look-up is left out of pictures, if one is.
+    pub(super) fn problem(&self) -> Option<&str> {
+        self.viewer.problem()
+    }
+
+    /// Seconds that an update fades in over.
+    pub(super) fn fade_s(&self) -> f32 {
+        self.viewer.fade_s(&self.options)
     }
 
     /// Counts a picture that was shown.

@@ -9,6 +9,7 @@ use dapple_scene::Scene;
 use dapple_stream::{Applied, ReceiveError, Subscriber, ValueChange};
 
 use super::inspect::Inspection;
+use crate::pace::Pace;
 
 /// What comes off the wire, resolved into texels.
 pub(super) struct Light {
@@ -20,74 +21,105 @@ pub(super) struct Light {
     is_new: bool,
     /// When the running fade began, seconds; long ago if none runs.
     fade_start_s: f64,
+    pace: Pace,
+    /// Why this atlas cannot be shown.
+    problem: Option<String>,
 }
 
 impl Light {
     pub(super) fn new(scene: Arc<Scene>, subscriber: Subscriber) -> Light {
         let inspection = Inspection::default();
-        Light { scene, subscriber, atlas: None, inspection, is_new: false, fade_start_s: f64::NEG_INFINITY }
+        Light {
+            scene,
+            subscriber,
+            atlas: None,
+            inspection,
+            is_new: false,
+            fade_start_s: f64::NEG_INFINITY,
+            pace: Pace::default(),
+            problem: None,
+        }
     }
 
-    pub(super) fn receive(&mut self, bytes: &[u8], now_s: f64) -> Result<Applied, ReceiveError> {
+    /// `fade_s` is how long fades take, as in [`Light::fade_s`].
+    pub(super) fn receive(
+        &mut self,
+        bytes: &[u8],
+        now_s: f64,
+        fade_s: Option<f32>,
+    ) -> Result<Applied, ReceiveError> {
         let applied = self.subscriber.receive(bytes)?;
         match &applied {
             Applied::NewLayout => {
                 self.is_new = true;
+                self.problem = None;
                 self.inspection.reset();
                 let cuts = self.subscriber.cuts();
                 self.atlas = self.subscriber.store().map(|store| {
                     VisibilityAtlas::new(store.layout().clone(), &self.scene, cuts, AtlasParams::default())
                 });
             }
-            Applied::Changes(changes) => self.apply(changes, now_s),
+            Applied::Changes(changes) => self.apply(changes, now_s, fade_s),
             Applied::Ignored(_) => {}
         }
         Ok(applied)
     }
 
-    fn apply(&mut self, changes: &[ValueChange], now_s: f64) {
+    fn apply(&mut self, changes: &[ValueChange], now_s: f64, fade_s: Option<f32>) {
+        // What changes nothing is no update: the fade goes on.
+        if changes.is_empty() {
+            return;
+        }
+        let progress = self.fade(now_s, fade_s);
+        self.pace.note(now_s);
         let Some(atlas) = &mut self.atlas else { return };
-        atlas.begin_update();
+        atlas.begin_update(progress);
         atlas.apply(changes.iter().map(|c| PointChange { point: c.point, old: c.old, new: c.new }));
         self.fade_start_s = now_s;
     }
 
     /// Makes charts and weights, about `texels` of work; what becomes ready fades in from `now_s` on.
-    pub(super) fn work(&mut self, texels: usize, now_s: f64, fade_s: f32) -> (u64, u64) {
+    pub(super) fn work(&mut self, texels: usize, now_s: f64, fade_s: Option<f32>) -> (u64, u64) {
+        let fade_s = self.fade_s(fade_s);
         let (Some(atlas), Some(store)) = (&mut self.atlas, self.subscriber.store()) else { return (0, 0) };
         if atlas.progress().is_complete() {
             let progress = atlas.progress();
             return (progress.done, progress.total);
         }
-        // Once a fade is over, another may begin without that what is shown jumps.
-        let is_over = self.fade_start_s + f64::from(fade_s) <= now_s;
-        if is_over {
-            atlas.begin_update();
-        }
         let before = atlas.ready_count();
         let progress = atlas.work(&self.scene, store.visibility(), texels);
-        if is_over && atlas.ready_count() > before {
+        if atlas.ready_count() > before {
+            // All texels share one fade: it begins anew, for the others from what they show.
+            atlas.begin_update(fade_at(self.fade_start_s, now_s, fade_s));
             self.fade_start_s = now_s;
         }
         (progress.done, progress.total)
     }
 
+    /// Seconds that a fade takes: those that are wanted, or what the pace of updates asks for.
+    pub(super) fn fade_s(&self, wanted_s: Option<f32>) -> f32 {
+        wanted_s.unwrap_or_else(|| self.pace.fade_s())
+    }
+
     /// How far the fade is at `now_s`, 0 … 1.
-    pub(super) fn fade(&self, now_s: f64, fade_s: f32) -> f32 {
-        if fade_s > 0.0 {
-            ((now_s - self.fade_start_s) / f64::from(fade_s)).clamp(0.0, 1.0) as f32
-        } else {
-            1.0
+    pub(super) fn fade(&self, now_s: f64, fade_s: Option<f32>) -> f32 {
+        fade_at(self.fade_start_s, now_s, self.fade_s(fade_s))
+    }
+
+    /// Why the atlas cannot be shown, if so: until there is another one.
+    pub(super) fn problem(&self) -> Option<&str> {
+        self.problem.as_deref()
+    }
+
+    /// Brings onto the card what changed since the last call. What fails is not tried again before another layout comes.
+    pub(super) fn upload(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene, now_s: f64) {
+        if self.problem.is_none() {
+            let uploaded = self.try_upload(gpu, gpu_scene, now_s);
+            self.problem = uploaded.err().map(|error| error.to_string());
         }
     }
 
-    /// Brings onto the card what changed since the last call.
-    pub(super) fn upload(
-        &mut self,
-        gpu: &Gpu,
-        gpu_scene: &mut GpuScene,
-        now_s: f64,
-    ) -> Result<(), ForwardError> {
+    fn try_upload(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene, now_s: f64) -> Result<(), ForwardError> {
         let Some(atlas) = &mut self.atlas else { return Ok(()) };
         if std::mem::take(&mut self.is_new) {
             for instance in 0..self.scene.instances.len() as u32 {
@@ -111,4 +143,9 @@ impl Light {
         }
         Ok(())
     }
+}
+
+/// How far a fade is at `now_s` that began at `start_s` and takes `fade_s`.
+fn fade_at(start_s: f64, now_s: f64, fade_s: f32) -> f32 {
+    if fade_s > 0.0 { ((now_s - start_s) / f64::from(fade_s)).clamp(0.0, 1.0) as f32 } else { 1.0 }
 }

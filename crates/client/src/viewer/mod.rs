@@ -40,9 +40,9 @@ pub struct Viewer {
     paper: PaperLookup,
     points: Option<PointsShown>,
     stats: ViewerStats,
-    /// The caller's clock and the fade when it last drew.
+    /// The caller's clock and the fade that was asked for when it last drew.
     now_s: f64,
-    fade_s: f32,
+    fade_s: Option<f32>,
 }
 
 /// What the points view needs, made when it is first shown.
@@ -92,24 +92,30 @@ impl Viewer {
     /// Takes one frame off the wire, which came at `now_s` (seconds on the caller's clock, as in [`Viewer::draw`]).
     /// On an error nothing has changed.
     pub fn receive(&mut self, bytes: &[u8], now_s: f64) -> Result<Applied, ReceiveError> {
-        let applied = self.light.receive(bytes, now_s)?;
+        let applied = self.light.receive(bytes, now_s, self.fade_s)?;
         self.stats.bytes_received += bytes.len() as u64;
         self.stats.frames_received += 1;
         self.stats.last_frame_s = Some(now_s);
         self.stats.points = self.store().map_or(0, |store| store.layout().len() as u32);
+        self.stats.changed = self.changed_by(&applied);
         match &applied {
-            Applied::Changes(changes) => {
-                self.stats.changed = changes.len() as u32;
-                self.paper.apply(changes);
-            }
+            Applied::Changes(changes) => self.paper.apply(changes),
             Applied::NewLayout => {
                 self.paper.forget();
-                self.stats.changed = self.stats.points;
                 self.points = None;
             }
             Applied::Ignored(_) => {}
         }
         Ok(applied)
+    }
+
+    /// How many points a frame has changed that was just taken, by what [`Viewer::receive`] gave: all for a new layout.
+    pub fn changed_by(&self, applied: &Applied) -> u32 {
+        match applied {
+            Applied::NewLayout => self.stats.points,
+            Applied::Changes(changes) => changes.len() as u32,
+            Applied::Ignored(_) => 0,
+        }
     }
 
     /// Goes on with the work that a snapshot causes (charts, weights), about `texels` texels of it (some 100,000 a
@@ -121,7 +127,8 @@ impl Viewer {
     }
 
     /// Draws the scene as it is at `scene_time_s` (its animation's time) into `target`, `width` × `height` pixels
-    /// large. `now_s` is the caller's clock, which the fade runs on.
+    /// large. `now_s` is the caller's clock, which the fade runs on. A look-up that cannot show the points is left out,
+    /// as if everything were open: [`Viewer::problem`].
     ///
     /// # Errors
     /// A camera or size that cannot be drawn, or a device that failed since the last picture.
@@ -137,10 +144,10 @@ impl Viewer {
         options: &DrawOptions,
     ) -> Result<(), ViewerError> {
         (self.now_s, self.fade_s) = (now_s, options.fade_s);
-        self.light.upload(gpu, &mut self.gpu_scene, now_s)?;
+        self.light.upload(gpu, &mut self.gpu_scene, now_s);
         let methods = [Some(options.method), options.split.map(|(_, method)| method)];
         if methods.contains(&Some(Method::PsaoPaper)) {
-            self.paper.prepare(gpu, &mut self.forward, self.light.subscriber.store())?;
+            self.paper.prepare(gpu, &mut self.forward, self.light.subscriber.store());
         }
         let wants_points = options.view == DebugView::Points;
         // Only where points are shown must the processor know where deforming meshes are.
@@ -152,14 +159,21 @@ impl Viewer {
         if wants_points {
             self.place_points(gpu, &pose);
         }
-        if let Some(atlas) = &self.light.atlas {
+        if let (Some(atlas), None) = (&self.light.atlas, self.light.problem()) {
             match options.view {
                 DebugView::Weights => self.light.inspection.show_weights(gpu, &mut self.gpu_scene, atlas)?,
                 DebugView::Age => self.light.inspection.show_ages(gpu, &mut self.gpu_scene, atlas, now_s)?,
                 _ => {}
             }
         }
-        let views = views(options, size, *camera, self.points.as_ref().map(|points| &points.on_card));
+        // What a look-up cannot show is open.
+        let lookup = |method| match method {
+            Method::Psao if self.light.problem().is_none() => LookupId::ATLAS,
+            Method::PsaoPaper if self.paper.problem().is_none() => paper::ID,
+            _ => LookupId::NONE,
+        };
+        let points = self.points.as_ref().map(|points| &points.on_card);
+        let views = views(options, size, *camera, points, &lookup);
         let inputs = FrameInputs {
             pose: &pose,
             shade: &self.config.shade,
@@ -192,7 +206,18 @@ impl Viewer {
         }
     }
 
-    /// Figures for an overlay.
+    /// Seconds that a fade takes now, drawn with `options`. After a change pictures differ for as long.
+    pub fn fade_s(&self, options: &DrawOptions) -> f32 {
+        self.light.fade_s(options.fade_s)
+    }
+
+    /// Why a look-up that was drawn with cannot show the points that there are: too many for the device or for the look-up's
+    /// structure. `None` if all is well; another layout, or another viewer, may do better.
+    pub fn problem(&self) -> Option<&str> {
+        self.light.problem().or(self.paper.problem())
+    }
+
+    /// Figures for an overlay. Looks at all that is held: a few times a second is enough.
     pub fn stats(&self) -> ViewerStats {
         let store_bytes = self.stats.points as u64 * BYTES_A_STORED_POINT;
         let (atlas_bytes, texels) =
@@ -223,20 +248,13 @@ impl Viewer {
 /// Three coordinates, a normal and a value.
 const BYTES_A_STORED_POINT: u64 = 15;
 
-fn lookup(method: Method) -> LookupId {
-    match method {
-        Method::None => LookupId::NONE,
-        Method::Psao => LookupId::ATLAS,
-        Method::PsaoPaper => paper::ID,
-    }
-}
-
 /// The whole picture, and what lies right of the split over it.
 fn views<'a>(
     options: &DrawOptions,
     size: (u32, u32),
     camera: PosedCamera,
     points: Option<&'a GpuPoints>,
+    lookup: &dyn Fn(Method) -> LookupId,
 ) -> Vec<View<'a>> {
     let other = options.split.map_or(Method::None, |(_, method)| method);
     let kind = match options.view {

@@ -65,7 +65,7 @@ pub enum DebugView {
 }
 
 /// How one picture is drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DrawOptions {
     /// What it shows.
     pub view: DebugView,
@@ -73,22 +73,11 @@ pub struct DrawOptions {
     pub method: Method,
     /// Right of this part of the width (0 … 1) the other method is shown.
     pub split: Option<(f32, Method)>,
-    /// Fade from the last update to this one over so many seconds; 0 shows updates as they come. Default 1/15.
-    pub fade_s: f32,
+    /// Fade from the last update to this one over so many seconds, 0 …; 0 shows updates as they come. `None` (default)
+    /// follows the pace of updates, so that a fade is over when the next one comes: [`Pace`](crate::pace::Pace).
+    pub fade_s: Option<f32>,
     /// Radiance to display.
     pub tone_map: ToneMap,
-}
-
-impl Default for DrawOptions {
-    fn default() -> Self {
-        DrawOptions {
-            view: DebugView::default(),
-            method: Method::default(),
-            split: None,
-            fade_s: 1.0 / 15.0,
-            tone_map: ToneMap::default(),
-        }
-    }
 }
 
 /// Work of a viewer after a snapshot, in texels.
@@ -138,7 +127,4 @@ pub enum ViewerError {
     /// The device failed; after a loss nothing works until everything is made anew on another.
     #[error(transparent)]
     Fault(#[from] GpuFault),
-    /// The points do not fit the paper's structure.
-    #[error(transparent)]
-    Tables(#[from] dapple_render::psao::TableError),
 }

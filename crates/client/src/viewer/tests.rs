@@ -8,7 +8,8 @@ use dapple_render::forward::Transparency;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{NoFiles, PosedCamera, Scene, builtin};
 use dapple_server::{Server, ServerConfig};
-use dapple_stream::Limits;
+use dapple_store::points::{MAX_COORDINATE, PackedNormal, PointLayout, PointSet, PointStore};
+use dapple_stream::{Limits, Publisher, PublisherConfig};
 
 use super::{DebugView, DrawOptions, Method, Viewer, ViewerConfig};
 use crate::{Client, PictureParams, Reconstruction};
@@ -114,7 +115,7 @@ fn it_shows_what_the_processor_shows_after_updates_too() {
     let snapshot = server.join().expect("it can be encoded").expect("there is one");
     viewer.receive(&snapshot.bytes, 0.0).expect("it is sound");
     client.receive(&snapshot.bytes).expect("it is sound");
-    let options = DrawOptions { view: DebugView::Visibility, fade_s: 0.0, ..DrawOptions::default() };
+    let options = DrawOptions { view: DebugView::Visibility, fade_s: Some(0.0), ..DrawOptions::default() };
 
     // Nothing is ready: all is open.
     let open = picture(&gpu, &mut viewer, 0.0, 0.0, &options);
@@ -155,7 +156,7 @@ fn surfaces_seen_from_both_sides_have_light_on_both() {
     viewer.receive(&snapshot.bytes, 0.0).expect("it is sound");
     client.receive(&snapshot.bytes).expect("it is sound");
     work_to_the_end(&mut viewer, usize::MAX);
-    let options = DrawOptions { view: DebugView::Visibility, fade_s: 0.0, ..DrawOptions::default() };
+    let options = DrawOptions { view: DebugView::Visibility, fade_s: Some(0.0), ..DrawOptions::default() };
     // From outside and below the hall shows little but backs.
     let bounds = scene.bounds_world(&scene.pose(0.0));
     let middle = 0.5 * (bounds.min + bounds.max);
@@ -184,7 +185,7 @@ fn a_fade_goes_from_the_last_update_to_this_one() {
     let mut viewer = viewer(&gpu, &scene);
     let snapshot = server.join().expect("it can be encoded").expect("there is one");
     viewer.receive(&snapshot.bytes, 0.0).expect("it is sound");
-    let options = DrawOptions { view: DebugView::Visibility, fade_s: 0.5, ..DrawOptions::default() };
+    let options = DrawOptions { view: DebugView::Visibility, fade_s: Some(0.5), ..DrawOptions::default() };
     picture(&gpu, &mut viewer, 0.0, 0.0, &options);
     work_to_the_end(&mut viewer, usize::MAX);
     picture(&gpu, &mut viewer, 0.0, 9.0, &options);
@@ -222,7 +223,7 @@ fn every_view_and_method_draws_and_a_split_shows_both() {
     let mut pictures = Vec::new();
     use DebugView::{Age, Beauty, Error, Normal, Points, Texels, Visibility, Weights};
     for view in [Beauty, Visibility, Normal, Points, Texels, Weights, Age, Error] {
-        let options = DrawOptions { view, fade_s: 0.0, ..DrawOptions::default() };
+        let options = DrawOptions { view, fade_s: Some(0.0), ..DrawOptions::default() };
         let shown = picture(&gpu, &mut viewer, 0.5, 20.0, &options);
         assert!(shown.iter().any(|p| *p != shown[0]), "{view:?} shows one colour");
         assert!(pictures.iter().all(|other| *other != shown), "{view:?} looks like another view");
@@ -232,7 +233,7 @@ fn every_view_and_method_draws_and_a_split_shows_both() {
         view: Visibility,
         method,
         split,
-        fade_s: 0.0,
+        fade_s: Some(0.0),
         ..DrawOptions::default()
     };
     let mut shown = |options: DrawOptions| picture(&gpu, &mut viewer, 0.5, 20.0, &options);
@@ -262,4 +263,45 @@ fn frames_of_another_scene_and_noise_change_nothing() {
     assert_eq!(viewer.stats().frames_received, 0);
     assert!(viewer.store().is_none());
     assert_eq!(viewer.work(1000).total, 0);
+}
+
+/// Two points as far apart as a layout allows, 1 m a step, spaced `spacing_m`.
+fn far_apart(spacing_m: f32) -> PointStore {
+    let set = PointSet {
+        positions: vec![[0; 3], [MAX_COORDINATE; 3]],
+        normals: vec![PackedNormal::default(); 2],
+        ..PointSet::default()
+    };
+    let layout = PointLayout::new(1.0, spacing_m, vec![set]).expect("points are in order");
+    PointStore::new(Arc::new(layout), vec![0; 2]).expect("one value a point")
+}
+
+#[test]
+fn a_look_up_that_fails_is_left_out_until_other_points_come() {
+    let Some(gpu) = gpu_for_tests() else { return };
+    let scene = atrium();
+    let mut viewer = viewer(&gpu, &scene);
+    let mut publisher = Publisher::new(scene.hash().0, PublisherConfig::default());
+    let mut publish = |store: &PointStore| publisher.publish(store).expect("memory suffices").expect("news");
+    let with = |method| DrawOptions {
+        view: DebugView::Visibility,
+        method,
+        fade_s: Some(0.0),
+        ..DrawOptions::default()
+    };
+    viewer.receive(&publish(&far_apart(1.0)).bytes, 0.0).expect("it is sound");
+    let open = picture(&gpu, &mut viewer, 0.0, 0.0, &with(Method::None));
+    assert_eq!(viewer.problem(), None);
+    // More cells than can be numbered.
+    for _ in 0..2 {
+        assert!(picture(&gpu, &mut viewer, 0.0, 0.0, &with(Method::PsaoPaper)) == open);
+        assert!(viewer.problem().is_some_and(|problem| problem.contains("cells")), "{:?}", viewer.problem());
+    }
+    let error = DrawOptions { view: DebugView::Error, ..with(Method::PsaoPaper) };
+    picture(&gpu, &mut viewer, 0.0, 0.0, &error);
+    // Wider cells are fewer.
+    viewer.receive(&publish(&far_apart(20_000.0)).bytes, 1.0).expect("it is sound");
+    assert_eq!(viewer.problem(), None);
+    picture(&gpu, &mut viewer, 0.0, 1.0, &with(Method::PsaoPaper));
+    assert_eq!(viewer.problem(), None);
 }

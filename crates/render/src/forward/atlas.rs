@@ -3,6 +3,7 @@
 use dapple_gpu::{Gpu, wgpu};
 
 use super::{ForwardError, layouts};
+use crate::psao::atlas::MAX_LAYERS;
 
 /// Rows of one layer that changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,7 +37,7 @@ impl AtlasTexture {
     /// written whole. Returns whether that happened, so that groups must be made anew too.
     ///
     /// # Errors
-    /// A size beyond the device's limits, or a layer of the wrong length; then nothing has changed.
+    /// A size beyond the device's limits, more layers than [`MAX_LAYERS`], or a layer of the wrong length; then nothing has changed.
     pub fn upload(
         &mut self,
         gpu: &Gpu,
@@ -47,13 +48,14 @@ impl AtlasTexture {
         let texels = layers;
         let layers = texels.len() as u32;
         let limits = gpu.device.limits();
-        if side == 0 || side > limits.max_texture_dimension_2d || layers > limits.max_texture_array_layers - 1
-        {
+        // A texture may get one layer more than are wanted.
+        let max_layers = (limits.max_texture_array_layers - 1).min(u32::from(MAX_LAYERS));
+        if side == 0 || side > limits.max_texture_dimension_2d || layers > max_layers {
             return Err(ForwardError::AtlasTooLarge {
                 side,
                 layers,
                 max_side: limits.max_texture_dimension_2d,
-                max_layers: limits.max_texture_array_layers - 1,
+                max_layers,
             });
         }
         let expected = side as usize * side as usize;

@@ -63,6 +63,13 @@ struct Draw {
     end: u32,
 }
 
+/// A view that shows the difference of two look-ups, and what each of them draws.
+struct Compared<'a> {
+    view: &'a View<'a>,
+    camera: &'a ViewCamera,
+    lists: [Vec<Draw>; 2],
+}
+
 impl Forward {
     /// Prepares to draw into views of `format` (a plain one: colours are encoded already) with 1 or 4 `samples` a pixel. The
     /// look-ups are [`LookupId::NONE`], [`LookupId::ATLAS`], and `lookups` as [`LookupId::added`].
@@ -154,14 +161,16 @@ impl Forward {
         let mut drawn =
             Drawn { ignored_lights: lights.ignored, shadow_faces: shadows.faces, ..Drawn::default() };
         let mut lists = Vec::with_capacity(inputs.views.len());
+        let mut compared = Vec::new();
         for (view, camera) in inputs.views.iter().zip(&cameras) {
             let list = self.list(gpu, scene, inputs, view, camera, view.lookup);
             if let ViewKind::Error { other } = view.kind {
                 let other = self.list(gpu, scene, inputs, view, camera, other);
-                self.draw_comparison(gpu, encoder, size, scene, view, camera, [&list, &other]);
+                compared.push(Compared { view, camera, lists: [list.clone(), other] });
             }
             lists.push(list);
         }
+        self.draw_comparisons(gpu, encoder, size, scene, &compared);
         let mut pass = self.begin(encoder, target, background(inputs));
         for ((view, camera), list) in inputs.views.iter().zip(&cameras).zip(&lists) {
             camera.apply(&mut pass, view);
@@ -392,18 +401,19 @@ impl Forward {
         (draws, triangles)
     }
 
-    /// Draws visibility by two look-ups into pictures of their own.
-    #[allow(clippy::too_many_arguments, reason = "two pictures of one view")]
-    fn draw_comparison(
+    /// Draws visibility by two look-ups into pictures of their own, which all views share: each pass clears its picture,
+    /// so one pass draws all of them.
+    fn draw_comparisons(
         &mut self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         size: (u32, u32),
         scene: &GpuScene,
-        view: &View<'_>,
-        camera: &ViewCamera,
-        lists: [&Vec<Draw>; 2],
+        compared: &[Compared<'_>],
     ) {
+        if compared.is_empty() {
+            return;
+        }
         if self.comparison.as_ref().is_none_or(|comparison| comparison.size != size) {
             let pictures = [(); 2].map(|()| {
                 let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
@@ -414,10 +424,12 @@ impl Forward {
             self.comparison = Some(Comparison { size, pictures, group });
         }
         let Some(comparison) = &self.comparison else { return };
-        for (picture, list) in comparison.pictures.iter().zip(lists) {
+        for (which, picture) in comparison.pictures.iter().enumerate() {
             let mut pass = self.begin(encoder, picture, inspection_background());
-            camera.apply(&mut pass, view);
-            self.run(&mut pass, scene, camera, list);
+            for Compared { view, camera, lists } in compared {
+                camera.apply(&mut pass, view);
+                self.run(&mut pass, scene, camera, &lists[which]);
+            }
         }
     }
 }

@@ -250,7 +250,9 @@ pub fn parse_closing(tail: &[u8]) -> Result<Vec<SnapshotAt>, RecordingError> {
     let malformed = |reason| RecordingError::Malformed { part, offset, reason };
     let mut fields = Fields(unseal(&tail[offset..], part, offset)?);
     let (tag, _entries, count) = (fields.u8(), fields.u64(), fields.u32() as usize);
-    if tag != TAG_CLOSING || CLOSING_FIXED_BYTES + count * SNAPSHOT_BYTES != length {
+    // The number may be any, and the product more than a machine of 32 bits counts.
+    let listed = count.checked_mul(SNAPSHOT_BYTES).and_then(|bytes| bytes.checked_add(CLOSING_FIXED_BYTES));
+    if tag != TAG_CLOSING || listed != Some(length) {
         return Err(malformed("does not fit its length"));
     }
     let snapshot = |_| SnapshotAt { entry: fields.u64(), offset: fields.u64(), time_us: fields.u64() };

@@ -321,6 +321,7 @@ impl GpuScene {
         if bytes != bytemuck::cast_slice::<_, u8>(&self.raw_before) {
             self.instance_buffer.write(gpu, bytes);
         }
+        self.pages.write(gpu);
         self.motion.now += 1;
         let now = self.motion.now;
         let last = &mut self.motion.last;

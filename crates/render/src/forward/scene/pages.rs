@@ -1,5 +1,7 @@
 //! Where the pages of every instance lie in the atlas.
 
+use std::ops::Range;
+
 use dapple_gpu::{Gpu, wgpu};
 use dapple_store::charts::Placement;
 
@@ -14,12 +16,14 @@ pub(crate) struct PageTable {
     entries: Vec<[u16; 4]>,
     /// First entry and number of entries of each instance.
     ranges: Vec<(u32, u32)>,
+    /// Rows that hold something else than the card does.
+    dirty: Range<u32>,
 }
 
 impl PageTable {
     pub(super) fn new(gpu: &Gpu, instances: usize) -> PageTable {
         let (texture, view) = make(gpu, 1);
-        PageTable { texture, view, entries: Vec::new(), ranges: vec![(0, 0); instances] }
+        PageTable { texture, view, entries: Vec::new(), ranges: vec![(0, 0); instances], dirty: 0..0 }
     }
 
     /// First entry of an instance.
@@ -28,7 +32,7 @@ impl PageTable {
     }
 
     /// Places the pages of an instance (those without a place are shown open). Returns whether the texture is
-    /// another one now.
+    /// another one now. What it holds is written by [`PageTable::write`].
     pub(super) fn set(&mut self, gpu: &Gpu, instance: usize, places: &[Placement]) -> bool {
         if self.ranges[instance].1 < places.len() as u32 {
             // Pages of an instance seldom change in number: what it had is left behind.
@@ -44,23 +48,42 @@ impl PageTable {
         let grows = rows > self.texture.height();
         if grows {
             (self.texture, self.view) = make(gpu, rows * 2);
+            self.dirty = 0..rows;
+        } else if count > 0 {
+            let (start, end) = (first / PAGE_TABLE_WIDTH, (first + count).div_ceil(PAGE_TABLE_WIDTH));
+            let is_clean = self.dirty.is_empty();
+            self.dirty.start = if is_clean { start } else { self.dirty.start.min(start) };
+            self.dirty.end = if is_clean { end } else { self.dirty.end.max(end) };
         }
-        self.write(gpu, rows);
         grows
     }
 
-    fn write(&mut self, gpu: &Gpu, rows: u32) {
+    /// Brings onto the card what was set since the last call: many instances at once.
+    pub(super) fn write(&mut self, gpu: &Gpu) {
+        let rows = std::mem::take(&mut self.dirty);
+        if rows.is_empty() {
+            return;
+        }
+        let width = PAGE_TABLE_WIDTH as usize;
         let len = self.entries.len();
-        self.entries.resize(rows as usize * PAGE_TABLE_WIDTH as usize, [0; 4]);
+        // Rows are written whole.
+        self.entries.resize(len.max(rows.end as usize * width), [0; 4]);
         gpu.queue.write_texture(
-            self.texture.as_image_copy(),
-            bytemuck::cast_slice(&self.entries),
+            wgpu::TexelCopyTextureInfo {
+                origin: wgpu::Origin3d { x: 0, y: rows.start, z: 0 },
+                ..self.texture.as_image_copy()
+            },
+            bytemuck::cast_slice(&self.entries[rows.start as usize * width..rows.end as usize * width]),
             wgpu::TexelCopyBufferLayout {
                 offset: 0,
                 bytes_per_row: Some(8 * PAGE_TABLE_WIDTH),
                 rows_per_image: None,
             },
-            wgpu::Extent3d { width: PAGE_TABLE_WIDTH, height: rows, depth_or_array_layers: 1 },
+            wgpu::Extent3d {
+                width: PAGE_TABLE_WIDTH,
+                height: rows.end - rows.start,
+                depth_or_array_layers: 1,
+            },
         );
         self.entries.truncate(len);
     }

@@ -6,7 +6,7 @@ use dapple_scene::PosedCamera;
 use dapple_store::charts::{Atlas, ChartParams, ChartSet, Placement};
 use glam::{Affine3A, Vec3};
 
-use super::super::{AtlasBand, FrameInputs, LookupId, View, ViewKind};
+use super::super::{AtlasBand, FrameInputs, LookupId, Rect, View, ViewKind};
 use super::harness::{Bench, inputs, save};
 use crate::gbuffer::{GBuffer, rasterize};
 use crate::image::Rgb8Image;
@@ -263,6 +263,16 @@ fn views_of_the_atlas_can_be_told_apart() {
         assert!(!pictures.contains(&picture), "{name}");
         pictures.push(picture);
     }
+    // Two views of an error share a picture and leave each other alone.
+    let params = ShadeParams::default();
+    let half = |x| {
+        let scissor = Some(Rect { x, y: 0, width: SIZE.0 / 2, height: SIZE.1 });
+        let kind = ViewKind::Error { other: LookupId::NONE };
+        View { kind, scissor, ..View::new(camera(), LookupId::ATLAS) }
+    };
+    let views = [half(0), half(SIZE.0 / 2)];
+    let halves = bench.draw(SIZE, &inputs(&charted.stage.pose, &params, &views));
+    assert!(pictures.last() == Some(&halves), "the halves of the last picture");
     // The error of a look-up against itself is nothing.
     let none = draw(&mut bench, &charted, ViewKind::Error { other: LookupId::ATLAS }, 1.0);
     let nothing = [8, 8, 12];

@@ -3,6 +3,7 @@
 //! Takes a layout, a scene, the values of the points and their changes; gives texels `[old, new]` in layers, which a
 //! fragment reads once, bilinearly. See `README.md`.
 
+mod job;
 mod pages;
 mod resolve;
 #[cfg(test)]
@@ -13,19 +14,16 @@ mod upload;
 use std::sync::Arc;
 
 use dapple_scene::Scene;
-use dapple_store::charts::{
-    AtlasError, ChartBuilder, ChartError, ChartParams, ChartSet, Cuts, InstanceKey, PointNeighbours,
-    SiteFinder, WeightParams, add_back_sites,
-};
+use dapple_store::charts::{AtlasError, ChartError, ChartSet, Cuts, InstanceKey, WeightParams};
 use dapple_store::points::PointLayout;
-use glam::Vec3;
 
 pub use dapple_store::charts::Placement;
-pub use pages::DirtyBand;
+pub use pages::{DirtyBand, MAX_LAYERS};
 pub use upload::TexelInfo;
 
+use job::{ENCODED_A_TEXEL, Job, SUMMED_A_TEXEL, Stage, VISITS_A_TEXEL};
 use pages::{Pages, PlacedPages};
-use resolve::{Builder, PointTexels, Sums, add_values};
+use resolve::{PointTexels, Sums};
 
 /// How an atlas is made. Cuts fit only the default texel sizes and kernel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,11 +32,16 @@ pub struct AtlasParams {
     pub weights: WeightParams,
     /// Factor on the edge of texels, > 0. Default 1: [`ChartParams::for_spacing`].
     pub texel_factor: f32,
+    /// Most texels of all instances together, gaps between pages not counted: an instance beyond stays open
+    /// ([`VisibilityAtlas::failed`]). Texels are as fine as the layout says that points are dense, and a layout comes from
+    /// outside: this bounds the memory that it can ask for, some 10 bytes a texel and 60 more while an instance is made.
+    /// Default `None`: 16 a point, and 2²⁰ more; 4 a point are common.
+    pub max_texels: Option<u64>,
 }
 
 impl Default for AtlasParams {
     fn default() -> Self {
-        AtlasParams { weights: WeightParams::default(), texel_factor: 1.0 }
+        AtlasParams { weights: WeightParams::default(), texel_factor: 1.0, max_texels: None }
     }
 }
 
@@ -81,12 +84,14 @@ pub struct VisibilityAtlas {
     queue: Vec<usize>,
     job: Option<Job>,
     done: u64,
+    /// Of the sets that are ready.
+    texels: u64,
     pages: Pages,
     /// Instances that became ready since they were last asked for.
     ready: Vec<u32>,
-    /// Sets whose texels still fade in from open.
+    /// Sets whose texels fade in from open and are not listed among `fading`; the last ones are those of `ready`.
     fresh: Vec<usize>,
-    /// Texels whose two values may differ.
+    /// All other texels whose two values may differ, each once.
     fading: Vec<u32>,
     failed: Vec<(u32, BuildError)>,
 }
@@ -100,6 +105,17 @@ pub enum BuildError {
     /// There is no room for its texels.
     #[error(transparent)]
     Atlas(#[from] AtlasError),
+    /// It has more texels than are left of what all instances may have.
+    #[error(
+        "atlas: {needed} texels with those of the instances before, at most {limit} may be; texels follow the layout's \
+         spacing, which does not fit its number of points"
+    )]
+    TooManyTexels {
+        /// Texels that there would be.
+        needed: u64,
+        /// [`AtlasParams::max_texels`].
+        limit: u64,
+    },
 }
 
 enum SetState {
@@ -118,41 +134,8 @@ struct ReadySet {
     placed: PlacedPages,
 }
 
-/// The set that is being made.
-struct Job {
-    set: usize,
-    /// Empty until they are made.
-    charts: Arc<ChartSet>,
-    charts_key: InstanceKey,
-    stage: Stage,
-}
-
-enum Stage {
-    Charts(Box<ChartBuilder>),
-    Sites {
-        finder: Box<SiteFinder>,
-        /// Of the mesh.
-        positions_rest: Vec<Vec3>,
-    },
-    Weigh(Box<Builder>),
-    Encode(Box<Builder>),
-    /// Points before `next` are in the sums.
-    Sum {
-        table: PointTexels,
-        sums: Sums,
-        next: usize,
-    },
-}
-
 /// Changes that are made together: enough to wait for memory together, few enough to stay in the nearest cache.
 const CHANGES_A_BATCH: usize = 32;
-
-/// Texels of work that other steps are worth, in parts of a weighed texel.
-const TRIANGLES_A_TEXEL: usize = 8;
-const VISITS_A_TEXEL: usize = 32;
-const SITES_A_TEXEL: usize = 32;
-const ENCODED_A_TEXEL: usize = 16;
-const SUMMED_A_TEXEL: usize = 16;
 
 impl VisibilityAtlas {
     /// An atlas in which everything is still open. `scene` must be the one that the layout was made for; `cuts` are left
@@ -178,6 +161,7 @@ impl VisibilityAtlas {
             queue,
             job: None,
             done: 0,
+            texels: 0,
             pages,
             ready: Vec::new(),
             fresh: Vec::new(),
@@ -237,163 +221,27 @@ impl VisibilityAtlas {
         Progress { done: self.done, total: self.done + (waiting + job) as u64 }
     }
 
-    /// Begins to make the charts of a set, or takes those of an instance with the same.
-    fn begin(&mut self, scene: &Scene, set: usize) -> (Option<Job>, usize) {
-        let instance_index = self.layout.sets()[set].instance;
-        let instance = &scene.instances[instance_index as usize];
-        let mesh = &scene.meshes[instance.mesh as usize];
-        let defaults = ChartParams::for_spacing(self.layout.spacing_m(), self.moves[instance_index as usize]);
-        let key = InstanceKey {
-            mesh: instance.mesh,
-            rest_from_mesh: instance.rest_from_mesh,
-            texel_m: defaults.texel_m * self.params.texel_factor,
-        };
-        let same = self.sets.iter().find_map(|state| match state {
-            SetState::Ready(ready) if ready.charts_key == key => Some(ready.charts.clone()),
-            _ => None,
-        });
-        if let Some(charts) = same {
-            let stage = Stage::sites(&charts, key.positions_rest(&mesh.positions));
-            return (Some(Job { set, charts, charts_key: key, stage }), 1);
+    /// Begins a fade: what is shown becomes old, and what was new stays new. Call it before the changes of an update are
+    /// applied, and show them with a fade that starts at 0. `progress` is how far the fade before has come that this one
+    /// breaks off, 0 … 1 (1: it was over, and what was new becomes old). Nothing shown jumps by more than half a step of
+    /// 1/255. Without it texels go on fading from what they showed before.
+    ///
+    /// Instances that nobody has asked for yet by [`VisibilityAtlas::take_ready`] are not shown so far: whatever the
+    /// progress, they start from open.
+    pub fn begin_update(&mut self, progress: f32) {
+        // What is no number breaks nothing off.
+        let progress = if progress.is_nan() { 1.0 } else { progress.clamp(0.0, 1.0) };
+        if progress == 0.0 {
+            return;
         }
-        let cost = mesh.triangles.len() / TRIANGLES_A_TEXEL + 1;
-        let positions_rest = key.positions_rest(&mesh.positions);
-        match ChartBuilder::new(&positions_rest, &mesh.triangles, &key.params(&defaults)) {
-            Ok(builder) => {
-                let stage = Stage::Charts(Box::new(builder));
-                (Some(Job { set, charts: Arc::default(), charts_key: key, stage }), cost)
-            }
-            Err(error) => {
-                self.failed.push((instance_index, error.into()));
-                (None, cost)
-            }
-        }
-    }
-
-    /// One step of a job, at most `budget` texels of it where it can be cut; gives what it cost.
-    fn advance(&mut self, scene: &Scene, visibility: &[u8], job: Job, budget: usize) -> usize {
-        let layout = self.layout.clone();
-        let set = &layout.sets()[job.set];
-        let mut job = job;
-        let cost;
-        job.stage = match job.stage {
-            Stage::Charts(mut builder) => match builder.work(budget.saturating_mul(VISITS_A_TEXEL)) {
-                Ok((visits, charts)) => {
-                    cost = visits / VISITS_A_TEXEL;
-                    match charts {
-                        Some(charts) => {
-                            job.charts = Arc::new(charts);
-                            let mesh = &scene.meshes[scene.instances[set.instance as usize].mesh as usize];
-                            Stage::sites(&job.charts, job.charts_key.positions_rest(&mesh.positions))
-                        }
-                        None => Stage::Charts(builder),
-                    }
-                }
-                Err(error) => {
-                    self.failed.push((set.instance, error.into()));
-                    return 1;
-                }
-            },
-            Stage::Sites { mut finder, positions_rest } => {
-                let mesh = &scene.meshes[scene.instances[set.instance as usize].mesh as usize];
-                let visits = budget.saturating_mul(VISITS_A_TEXEL);
-                let visited = finder.work(&job.charts, &positions_rest, &mesh.triangles, visits);
-                if visited > 0 {
-                    job.stage = Stage::Sites { finder, positions_rest };
-                    self.job = Some(job);
-                    return visited / VISITS_A_TEXEL;
-                }
-                let mut sites = finder.finish();
-                let mut texels = job.charts.texel_count();
-                if scene.is_two_sided(mesh) {
-                    add_back_sites(&mut sites, texels);
-                    texels *= 2;
-                }
-                let neighbours = PointNeighbours::new(&layout, set, &self.params.weights);
-                cost = sites.len() / SITES_A_TEXEL;
-                let cuts = self.cuts.as_ref().and_then(|cuts| cuts.for_sites(set.instance, &sites));
-                let cuts = cuts.map_or(Vec::new(), |set| set.cuts.clone());
-                Stage::Weigh(Box::new(Builder::new(neighbours, set, sites, cuts, texels)))
-            }
-            Stage::Weigh(mut builder) => {
-                let before = builder.weighed();
-                builder.weigh(set, budget);
-                cost = builder.weighed() - before;
-                if builder.weighed() == builder.sites() {
-                    builder.begin_encoding();
-                    Stage::Encode(builder)
-                } else {
-                    Stage::Weigh(builder)
-                }
-            }
-            Stage::Encode(mut builder) => {
-                let before = builder.encoded();
-                builder.encode(budget.saturating_mul(ENCODED_A_TEXEL));
-                cost = (builder.encoded() - before) / ENCODED_A_TEXEL;
-                if builder.encoded() == builder.sites() {
-                    let (table, sums) = builder.finish();
-                    Stage::Sum { table, sums, next: 0 }
-                } else {
-                    Stage::Encode(builder)
-                }
-            }
-            Stage::Sum { table, mut sums, next } => {
-                let end = next.saturating_add(budget.saturating_mul(SUMMED_A_TEXEL)).min(set.len());
-                let first = set.first as usize;
-                add_values(&table, &mut sums, &visibility[first..first + set.len()], next..end);
-                cost = (end - next) / SUMMED_A_TEXEL;
-                if end == set.len() {
-                    self.place(job.set, job.charts, job.charts_key, table, sums);
-                    return cost;
-                }
-                Stage::Sum { table, sums, next: end }
-            }
-        };
-        self.job = Some(job);
-        cost
-    }
-
-    /// Gives a finished set its place in the layers.
-    fn place(
-        &mut self,
-        set: usize,
-        charts: Arc<ChartSet>,
-        charts_key: InstanceKey,
-        table: PointTexels,
-        sums: Sums,
-    ) {
-        // The back's texels follow the front's.
-        let sides = if sums.len() > charts.texel_count() as usize { 2 } else { 1 };
-        let placements = match self.pages.place(&charts.pages().repeat(sides)) {
-            Ok(placements) => placements,
-            Err(error) => {
-                self.failed.push((self.layout.sets()[set].instance, error.into()));
-                return;
-            }
-        };
-        let placed = PlacedPages::new(&charts, &placements, self.pages.side());
-        for ((first, size), placement) in placed.firsts().zip(charts.pages().iter().cycle()).zip(&placements)
-        {
-            self.pages.fill(*placement, *size, |i| [255, sums.value(first + i)]);
-        }
-        let ready = ReadySet { charts, charts_key, table, sums, placements, placed };
-        self.sets[set] = SetState::Ready(Box::new(ready));
-        self.fresh.push(set);
-        self.ready.push(self.layout.sets()[set].instance);
-    }
-
-    /// Begins a fade: what was new so far becomes old. Call it before the changes of an update are applied (and show them
-    /// with a fade that starts at 0); without it texels go on fading from what they showed before.
-    pub fn begin_update(&mut self) {
-        for set in std::mem::take(&mut self.fresh) {
+        self.pages.advance(&mut self.fading, progress);
+        let shown = self.fresh.len() - self.ready.len();
+        for set in self.fresh.drain(..shown) {
             if let SetState::Ready(ready) = &self.sets[set] {
                 for (placement, size) in ready.placements.iter().zip(ready.charts.pages().iter().cycle()) {
-                    self.pages.settle_page(*placement, *size);
+                    self.pages.advance_page(*placement, *size, progress, &mut self.fading);
                 }
             }
-        }
-        for address in std::mem::take(&mut self.fading) {
-            self.pages.settle(address);
         }
     }
 
@@ -482,22 +330,5 @@ impl ReadySet {
             let mut texels = pages.write(address, row.len(), fading);
             self.sums.add(texel, row, difference, |value| texels.next(value));
         }
-    }
-}
-
-impl Stage {
-    fn sites(charts: &ChartSet, positions_rest: Vec<Vec3>) -> Stage {
-        Stage::Sites { finder: Box::new(SiteFinder::new(charts)), positions_rest }
-    }
-}
-
-impl Job {
-    fn memory_bytes(&self) -> u64 {
-        let stage = match &self.stage {
-            Stage::Charts(_) | Stage::Sites { .. } => 0,
-            Stage::Weigh(builder) | Stage::Encode(builder) => builder.bytes(),
-            Stage::Sum { table, sums, .. } => table.bytes() + sums.bytes(),
-        };
-        self.charts.memory_bytes() + stage as u64
     }
 }

@@ -16,8 +16,8 @@ pub struct DirtyBand {
 /// Sides of layers, texels. No page is longer than the smaller.
 const SIDES: [u16; 2] = [1024, 2048];
 
-/// As many as every graphics card takes.
-const MOST_LAYERS: u16 = 256;
+/// Most layers of an atlas: every graphics card takes 256, and a texture may get one more than are wanted of it.
+pub const MAX_LAYERS: u16 = 255;
 
 /// Texels a point, gaps between pages counted, by which the side is chosen.
 const TEXELS_A_POINT: usize = 4;
@@ -37,6 +37,8 @@ pub(super) struct Pages {
     texels: Vec<[u8; 2]>,
     /// One for each row of each layer.
     dirty: Vec<bool>,
+    /// One bit a texel: whether a list of fading texels has it, so that none has it twice.
+    listed: Vec<u64>,
     places: Atlas,
 }
 
@@ -44,14 +46,9 @@ impl Pages {
     pub(super) fn for_points(points: usize) -> Pages {
         let wanted = points * TEXELS_A_POINT;
         let side = if wanted <= usize::from(SIDES[0]).pow(2) { SIDES[0] } else { SIDES[1] };
-        let places = Atlas::new(side, MOST_LAYERS);
-        Pages {
-            side: u32::from(side),
-            side_log2: side.ilog2(),
-            texels: Vec::new(),
-            dirty: Vec::new(),
-            places,
-        }
+        let places = Atlas::new(side, MAX_LAYERS);
+        let (side, side_log2) = (u32::from(side), side.ilog2());
+        Pages { side, side_log2, texels: Vec::new(), dirty: Vec::new(), listed: Vec::new(), places }
     }
 
     pub(super) fn side(&self) -> u32 {
@@ -84,7 +81,7 @@ impl Pages {
     }
 
     pub(super) fn bytes(&self) -> usize {
-        self.texels.len() * size_of::<[u8; 2]>() + self.dirty.len()
+        self.texels.len() * size_of::<[u8; 2]>() + self.dirty.len() + size_of_val(self.listed.as_slice())
     }
 
     /// Finds places for the pages of an instance; makes new layers if there is no room.
@@ -93,6 +90,7 @@ impl Pages {
         let rows = (self.layers() * self.side) as usize;
         if rows > self.dirty.len() {
             self.texels.resize(rows * self.side as usize, OPEN);
+            self.listed.resize(self.texels.len().div_ceil(64), 0);
             self.dirty.resize(rows, true);
             // A larger texture is a new one: everything must be uploaded.
             self.dirty.fill(true);
@@ -114,25 +112,67 @@ impl Pages {
         }
     }
 
-    /// Ends the fade of all texels of a page.
-    pub(super) fn settle_page(&mut self, place: Placement, size: PageSize) {
+    /// Goes on with the fade of all texels of a page that no list has, as [`Pages::advance`] does; those that go on
+    /// fading join `fading`.
+    pub(super) fn advance_page(
+        &mut self,
+        place: Placement,
+        size: PageSize,
+        progress: f32,
+        fading: &mut Vec<u32>,
+    ) {
         for y in 0..u32::from(size.height) {
-            let start =
-                self.address(u32::from(place.layer), u32::from(place.x), u32::from(place.y) + y) as usize;
-            for texel in &mut self.texels[start..start + usize::from(size.width)] {
-                texel[0] = texel[1];
+            let start = self.address(u32::from(place.layer), u32::from(place.x), u32::from(place.y) + y);
+            for address in start..start + u32::from(size.width) {
+                if !self.is_listed(address) && self.mix(address, progress) {
+                    self.set_listed(address, true);
+                    fading.push(address);
+                }
             }
-            self.dirty[start / self.side as usize] = true;
         }
     }
 
-    /// Ends the fade of one texel.
-    pub(super) fn settle(&mut self, address: u32) {
-        let texel = &mut self.texels[address as usize];
-        if texel[0] != texel[1] {
-            texel[0] = texel[1];
+    /// Makes old what listed texels show at `progress` of their fade, 0 … 1; those that are at its end leave the list.
+    pub(super) fn advance(&mut self, fading: &mut Vec<u32>, progress: f32) {
+        fading.retain(|&address| {
+            let goes_on = self.mix(address, progress);
+            if !goes_on {
+                self.set_listed(address, false);
+            }
+            goes_on
+        });
+    }
+
+    /// Makes old what a texel shows; whether it goes on fading.
+    fn mix(&mut self, address: u32, progress: f32) -> bool {
+        let [old, new] = &mut self.texels[address as usize];
+        if old == new {
+            return false;
+        }
+        if progress >= 1.0 {
+            *old = *new;
+            self.dirty[(address >> self.side_log2) as usize] = true;
+            return false;
+        }
+        let shown = f32::from(*old) + progress * (f32::from(*new) - f32::from(*old));
+        let before = std::mem::replace(old, (shown + 0.5) as u8);
+        let goes_on = old != new;
+        if *old != before {
             self.dirty[(address >> self.side_log2) as usize] = true;
         }
+        goes_on
+    }
+
+    #[inline]
+    fn is_listed(&self, address: u32) -> bool {
+        self.listed[address as usize / 64] >> (address % 64) & 1 != 0
+    }
+
+    #[inline]
+    fn set_listed(&mut self, address: u32, listed: bool) {
+        let bit = 1 << (address % 64);
+        let word = &mut self.listed[address as usize / 64];
+        *word = if listed { *word | bit } else { *word & !bit };
     }
 
     /// Gives new values to `count` texels of one row, the first at `address`. Addresses of those that did not fade before
@@ -145,7 +185,8 @@ impl Pages {
         fading: &'a mut Vec<u32>,
     ) -> RowWriter<'a> {
         let texels = self.texels[address as usize..][..count].iter_mut();
-        RowWriter { texels, address, dirty: &mut self.dirty[(address >> self.side_log2) as usize], fading }
+        let dirty = &mut self.dirty[(address >> self.side_log2) as usize];
+        RowWriter { texels, address, dirty, listed: &mut self.listed, fading }
     }
 
     /// The rows that changed since the last call, joined to bands.
@@ -171,6 +212,7 @@ pub(super) struct RowWriter<'a> {
     texels: std::slice::IterMut<'a, [u8; 2]>,
     address: u32,
     dirty: &'a mut bool,
+    listed: &'a mut [u64],
     fading: &'a mut Vec<u32>,
 }
 
@@ -184,11 +226,14 @@ impl RowWriter<'_> {
         if texel[1] == value {
             return;
         }
-        if texel[0] == texel[1] {
-            self.fading.push(address);
-        }
+        let is_at_rest = texel[0] == texel[1];
         texel[1] = value;
         *self.dirty = true;
+        let (word, bit) = (&mut self.listed[address as usize / 64], 1u64 << (address % 64));
+        if is_at_rest && *word & bit == 0 {
+            *word |= bit;
+            self.fading.push(address);
+        }
     }
 }
 
@@ -281,5 +326,26 @@ mod tests {
         assert_eq!(pages.take_dirty(), [DirtyBand { layer: 0, y: 1..6 }, DirtyBand { layer: 0, y: 30..31 }]);
         assert!(pages.take_dirty().is_empty());
         assert_eq!(pages.texel(0, 3, 30), [(30 * 10 + 3) as u8, 1]);
+    }
+
+    #[test]
+    fn no_texel_fades_twice_as_fast() {
+        let mut pages = Pages::for_points(1000);
+        let size = PageSize { width: 8, height: 1 };
+        let place = pages.place(&[size]).unwrap()[0];
+        let mut fading = Vec::new();
+        // Away, back and away again.
+        for value in [55, 255, 55] {
+            pages.write(0, value, &mut fading);
+        }
+        assert_eq!(fading, [0]);
+        // Its page is asked to go on as well, and leaves it to the list.
+        pages.advance(&mut fading, 0.25);
+        pages.advance_page(place, size, 0.25, &mut fading);
+        assert_eq!((pages.texel(0, 0, 0), fading.as_slice()), ([205, 55], [0].as_slice()));
+        pages.advance(&mut fading, 1.0);
+        assert_eq!((pages.texel(0, 0, 0), fading.len()), ([55, 55], 0));
+        pages.write(0, 56, &mut fading);
+        assert_eq!(fading, [0], "it can fade again");
     }
 }

@@ -84,6 +84,7 @@ fn complete(scene: &Scene, layout: &Arc<PointLayout>, values: &[u8]) -> Visibili
     let mut atlas = VisibilityAtlas::new(layout.clone(), scene, None, AtlasParams::default());
     while !atlas.work(scene, values, usize::MAX).is_complete() {}
     assert!(atlas.failed().is_empty());
+    atlas.take_ready();
     atlas
 }
 
@@ -106,14 +107,14 @@ proptest! {
     fn changes_lead_to_the_texels_of_a_fresh_atlas(
         seed: u32,
         piece in 1usize..3000,
-        rounds in prop::collection::vec((0usize..200, any::<bool>(), 0usize..4), 1..12),
+        rounds in prop::collection::vec((0usize..200, any::<bool>(), 0usize..4, 0f32..1.2), 1..12),
     ) {
         let scene = stage();
         let layout = lay(&scene, 0.1);
         let mut values: Vec<u8> = (0..layout.len() as u32).map(|i| noise(i, seed) as u8).collect();
         let mut atlas = VisibilityAtlas::new(layout.clone(), &scene, None, AtlasParams::default());
         // Changes come while the atlas is being made, and after.
-        for (round, (count, begins, pieces)) in rounds.into_iter().enumerate() {
+        for (round, (count, begins, pieces, progress)) in rounds.into_iter().enumerate() {
             for _ in 0..pieces {
                 atlas.work(&scene, &values, piece);
             }
@@ -126,7 +127,7 @@ proptest! {
                 })
                 .collect();
             if begins {
-                atlas.begin_update();
+                atlas.begin_update(progress);
             }
             atlas.apply(changes);
         }
@@ -217,10 +218,16 @@ fn surfaces_are_open_until_they_are_ready_and_then_fade_in() {
     assert!(atlas.charts(0).is_some());
     assert_eq!([0.0, 0.5, 1.0].map(|fade| atlas.visibility(0, 0, [0.3, 0.3], false, fade)), [1.0, 0.5, 0.0]);
     assert!(!atlas.take_dirty().is_empty());
-    atlas.begin_update();
+    // Halfway, then at the end.
+    atlas.begin_update(0.5);
+    assert_eq!([0.0, 1.0].map(|fade| atlas.visibility(0, 0, [0.3, 0.3], false, fade)), [128.0 / 255.0, 0.0]);
+    atlas.begin_update(1.0);
     assert_eq!(atlas.visibility(0, 0, [0.3, 0.3], false, 0.0), 0.0);
     assert!(!atlas.take_dirty().is_empty());
     while !atlas.work(&scene, &values, 10).is_complete() {}
+    // Nobody has seen the others yet.
+    atlas.begin_update(0.9);
+    assert_eq!([0.0, 1.0].map(|fade| atlas.visibility(1, 0, [0.3, 0.3], false, fade)), [1.0, 0.0]);
     assert_eq!(atlas.take_ready().len(), 3);
     assert!(Arc::ptr_eq(atlas.charts(2).unwrap(), atlas.charts(3).unwrap()), "one mesh, one size");
     // What is not in the scene or has no points is open.
@@ -239,7 +246,7 @@ fn an_update_fades_from_the_one_before() {
     let shown =
         |atlas: &VisibilityAtlas, fade| (atlas.visibility(1, 3, [0.3, 0.3], false, fade) * 255.0).round();
     for (old, new) in [(200, 100), (100, 40)] {
-        atlas.begin_update();
+        atlas.begin_update(1.0);
         atlas.take_dirty();
         atlas.apply(all(old, new));
         let ends = [0.0, 1.0].map(|fade| shown(&atlas, fade));
@@ -250,10 +257,71 @@ fn an_update_fades_from_the_one_before() {
     // Without a beginning the fade goes on from where it began.
     atlas.apply(all(40, 10));
     assert_eq!([0.0, 1.0].map(|fade| shown(&atlas, fade)), [100.0, 10.0]);
-    atlas.begin_update();
+    atlas.begin_update(1.0);
     assert_eq!(shown(&atlas, 0.0), 10.0);
     // Points that do not exist are left out.
     atlas.apply([PointChange { point: u32::MAX, old: 0, new: 255 }]);
+}
+
+#[test]
+fn updates_that_come_before_a_fade_ends_do_not_jump() {
+    let scene = stage();
+    let layout = lay(&scene, 0.1);
+    let mut values = vec![255; layout.len()];
+    let mut atlas = VisibilityAtlas::new(layout.clone(), &scene, None, AtlasParams::default());
+    while !atlas.work(&scene, &values, usize::MAX).is_complete() {}
+    atlas.take_ready();
+    let shown = |atlas: &VisibilityAtlas, fade: f32| -> Vec<f32> {
+        (0..4).flat_map(|instance| middles(&scene, atlas, instance, fade)).collect()
+    };
+    let mut fade = 1.0;
+    for (round, until) in (0u32..).zip([0.1, 0.5, 0.0, 0.95, 0.3, 1.0, 0.02, 0.7]) {
+        let before = shown(&atlas, fade);
+        atlas.begin_update(fade);
+        // Some points change, among them such that still fade, and some go back to where they were.
+        let changes: Vec<PointChange> = (0..layout.len() as u32)
+            .filter(|&point| noise(point, round).is_multiple_of(3))
+            .map(|point| {
+                let random = noise(point, round ^ 77);
+                let to = if random.is_multiple_of(2) { 255 } else { (random >> 24) as u8 };
+                let old = std::mem::replace(&mut values[point as usize], to);
+                PointChange { point, old, new: to }
+            })
+            .collect();
+        atlas.apply(changes);
+        for (at, (a, b)) in before.iter().zip(shown(&atlas, 0.0)).enumerate() {
+            assert!((a - b).abs() <= 0.502 / 255.0, "round {round}, place {at}: {a} became {b}");
+        }
+        fade = until;
+    }
+    assert_eq!(news(&atlas), news(&complete(&scene, &layout, &values)));
+}
+
+#[test]
+fn instances_beyond_the_bound_of_texels_stay_open() {
+    let scene = stage();
+    let layout = lay(&scene, 0.1);
+    let make = |layout: &Arc<PointLayout>, max_texels| {
+        let params = AtlasParams { max_texels, ..AtlasParams::default() };
+        let mut atlas = VisibilityAtlas::new(layout.clone(), &scene, None, params);
+        while !atlas.work(&scene, &vec![0; layout.len()], usize::MAX).is_complete() {}
+        atlas
+    };
+    let is_refused = |(_, error): &(u32, BuildError)| matches!(error, BuildError::TooManyTexels { .. });
+    let none = make(&layout, Some(0));
+    assert!(none.failed().len() == 4 && none.failed().iter().all(is_refused), "{:?}", none.failed());
+    assert_eq!((none.ready_count(), none.texel_count()), (0, 0));
+    assert_eq!(none.visibility(0, 0, [0.3, 0.3], false, 1.0), 1.0);
+    // Exactly as many as there are suffice, and one less does not for the last.
+    let all: u64 = (0..4).map(|i| u64::from(make(&layout, None).charts(i).unwrap().texel_count())).sum();
+    assert!(make(&layout, Some(all)).failed().is_empty());
+    assert_eq!(make(&layout, Some(all - 1)).failed().len(), 1);
+    // What a layout says of its spacing asks for no more than its points are worth.
+    let sets = layout.sets().to_vec();
+    let fine = Arc::new(PointLayout::new(layout.quantum_m(), 1e-5, sets).unwrap());
+    let atlas = make(&fine, None);
+    assert!(!atlas.failed().is_empty() && atlas.failed().iter().all(is_refused), "{:?}", atlas.failed());
+    assert!(atlas.memory_bytes() < 100 << 20, "{} bytes", atlas.memory_bytes());
 }
 
 #[test]
@@ -429,7 +497,7 @@ fn a_frames_changes_are_applied_within_a_millisecond() {
         for round in 0..20u8 {
             let (old, new) = if round % 2 == 0 { (100, 180) } else { (180, 100) };
             let start = std::time::Instant::now();
-            atlas.begin_update();
+            atlas.begin_update(1.0);
             atlas.apply(points.iter().map(|&point| PointChange { point, old, new }));
             best = best.min(start.elapsed());
         }

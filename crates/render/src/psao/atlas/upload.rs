@@ -1,5 +1,6 @@
 //! What a program reads of an atlas: texels to upload, where pages lie, figures for debug views.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use dapple_store::charts::{ChartSet, Placement};
@@ -62,7 +63,8 @@ impl VisibilityAtlas {
         self.pages.take_dirty()
     }
 
-    /// Instances that became ready since the last call, in the order in which they did.
+    /// Instances that became ready since the last call, in the order in which they did. Until they are asked for they
+    /// count as not shown ([`VisibilityAtlas::begin_update`]).
     pub fn take_ready(&mut self) -> Vec<u32> {
         std::mem::take(&mut self.ready)
     }
@@ -87,17 +89,14 @@ impl VisibilityAtlas {
     /// (15 bytes a point with its values).
     pub fn memory_bytes(&self) -> u64 {
         let mut bytes = self.pages.bytes() as u64;
-        let mut counted: Vec<*const ChartSet> = Vec::new();
+        // Shared ones count once.
+        let mut charts = BTreeMap::new();
         for state in &self.sets {
             let SetState::Ready(ready) = state else { continue };
             bytes += (ready.table.bytes() + ready.sums.bytes()) as u64;
-            let charts = Arc::as_ptr(&ready.charts);
-            if !counted.contains(&charts) {
-                counted.push(charts);
-                bytes += ready.charts.memory_bytes();
-            }
+            charts.insert(Arc::as_ptr(&ready.charts), ready.charts.memory_bytes());
         }
-        bytes + self.job.as_ref().map_or(0, |job| job.memory_bytes())
+        bytes + charts.values().sum::<u64>() + self.job.as_ref().map_or(0, |job| job.memory_bytes())
     }
 
     /// What each texel of a layer is made of. Looks at all points: for debug views.
