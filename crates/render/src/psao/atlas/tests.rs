@@ -1,7 +1,7 @@
 //! Exactness and truth of the atlas.
 
 use dapple_scene::{AlphaMode, Material};
-use dapple_store::charts::{Candidate, SetCuts, SiteCut, fingerprint};
+use dapple_store::charts::{Candidate, ChartParams, PointNeighbours, SetCuts, SiteCut, fingerprint};
 use dapple_store::points::{MAX_COORDINATE, PackedNormal, PointSet, morton_code};
 use glam::{Affine3A, Mat3, Vec3};
 use proptest::prelude::*;
