@@ -165,17 +165,6 @@ impl Gpu {
     pub fn take_fault(&self) -> Option<GpuFault> {
         self.faults.take()
     }
-
-    /// Whether fragment shaders can read storage buffers (not on WebGL2).
-    pub fn has_storage_buffers(&self) -> bool {
-        let limits = self.device.limits();
-        limits.max_storage_buffers_per_shader_stage >= 4 && limits.max_storage_buffer_binding_size > 0
-    }
-
-    /// Whether textures can be read through a view of another format than their own (not on WebGL2).
-    pub fn has_view_formats(&self) -> bool {
-        self.adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::VIEW_FORMATS)
-    }
 }
 
 /// The first adapter with a text in its name that can present to the surface.

@@ -91,7 +91,8 @@ impl Light {
         if atlas.ready_count() > before {
             // All texels share one fade: it begins anew, for the others from what they show.
             atlas.begin_update(fade_at(self.fade_start_s, now_s, fade_s));
-            self.fade_start_s = now_s;
+            // An update that has come since shows nothing of its fade yet: they begin together.
+            self.fade_start_s = self.fade_start_s.max(now_s);
         }
         (progress.done, progress.total)
     }

@@ -212,6 +212,29 @@ fn a_fade_goes_from_the_last_update_to_this_one() {
 }
 
 #[test]
+fn an_update_in_the_middle_of_a_fade_goes_on_from_what_is_shown() {
+    let Some(gpu) = gpu_for_tests() else { return };
+    let scene = atrium();
+    let mut server = server(&scene, 32.0);
+    let mut viewer = viewer(&gpu, &scene);
+    let snapshot = server.join().expect("it can be encoded").expect("there is one");
+    viewer.receive(&snapshot.bytes, 0.0).expect("it is sound");
+    let options = DrawOptions { view: DebugView::Visibility, fade_s: Some(0.5), ..DrawOptions::default() };
+    picture(&gpu, &mut viewer, 0.0, 0.0, &options);
+    work_to_the_end(&mut viewer, usize::MAX);
+    picture(&gpu, &mut viewer, 0.0, 9.0, &options);
+    for tick in 0..4 {
+        let now_s = 10.0 + 0.2 * f64::from(tick);
+        let before = picture(&gpu, &mut viewer, 0.0, now_s, &options);
+        let frame = server.step(f64::from(tick + 1)).expect("it steps").frame.expect("something moved");
+        viewer.receive(&frame.bytes, now_s).expect("it is sound");
+        let after = picture(&gpu, &mut viewer, 0.0, now_s, &options);
+        let jump = before.iter().zip(&after).map(|(a, b)| a[0].abs_diff(b[0])).max();
+        assert!(jump <= Some(1), "update {tick}: a pixel jumps by {jump:?}");
+    }
+}
+
+#[test]
 fn every_view_and_method_draws_and_a_split_shows_both() {
     let Some(gpu) = gpu_for_tests() else { return };
     let scene = atrium();

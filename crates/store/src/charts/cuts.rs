@@ -1,6 +1,6 @@
 //! Which points may not count at which texels, because something solid stands between them.
 
-use super::{MAX_CANDIDATES, Site};
+use super::{MAX_CANDIDATES, MovingLeastSquares, Site};
 
 /// What one end has found out by rays, for the other that has none.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -15,7 +15,7 @@ pub struct SetCuts {
     pub instance: u32,
     /// Sites of the instance.
     pub sites: u32,
-    /// [`fingerprint`] of the sites: the cuts fit no others.
+    /// [`fingerprint`] of the sites and their candidates: the cuts fit no others.
     pub fingerprint: u32,
     /// Sites with something to cut, strictly increasing.
     pub cuts: Vec<SiteCut>,
@@ -68,11 +68,11 @@ impl Cuts {
         &self.sets
     }
 
-    /// The cuts of an instance, if there are any and they were made for these sites.
-    pub fn for_sites(&self, instance: u32, sites: &[Site]) -> Option<&SetCuts> {
+    /// The cuts of an instance, if there are any and they were made for these sites, with candidates by this kernel.
+    pub fn for_sites(&self, instance: u32, sites: &[Site], kernel: &MovingLeastSquares) -> Option<&SetCuts> {
         let at = self.sets.binary_search_by_key(&instance, |set| set.instance).ok()?;
         let set = &self.sets[at];
-        (set.sites as usize == sites.len() && set.fingerprint == fingerprint(sites)).then_some(set)
+        (set.sites as usize == sites.len() && set.fingerprint == fingerprint(sites, kernel)).then_some(set)
     }
 
     /// Sites with something to cut, of all sets.
@@ -91,16 +91,18 @@ impl SetCuts {
     }
 }
 
-/// A number that tells lists of sites apart, to the bit: cuts made by one end fit the other's sites only if these are the same.
-pub fn fingerprint(sites: &[Site]) -> u32 {
+/// A number that tells lists of sites and kernels apart, to the bit. Cuts made by one end fit the other's sites only if these
+/// are the same; and masks count candidates, which are chosen by the kernel.
+pub fn fingerprint(sites: &[Site], kernel: &MovingLeastSquares) -> u32 {
     // FNV-1a over words, folded at the end.
-    let mut hash = 0xcbf2_9ce4_8422_2325u64;
+    let add = |hash: u64, word: u32| (hash ^ u64::from(word)).wrapping_mul(0x100_0000_01b3);
+    let MovingLeastSquares { radius, normal_power, plane } = *kernel;
+    let choice = [radius.to_bits(), normal_power, plane.to_bits(), MAX_CANDIDATES as u32];
+    let mut hash = choice.into_iter().fold(0xcbf2_9ce4_8422_2325, add);
     for site in sites {
         let [x, y, z] = site.position_rest.to_array().map(f32::to_bits);
         let [nx, ny, nz] = site.normal_rest.to_array().map(f32::to_bits);
-        for word in [site.texel, x, y, z, nx, ny, nz] {
-            hash = (hash ^ u64::from(word)).wrapping_mul(0x100_0000_01b3);
-        }
+        hash = [site.texel, x, y, z, nx, ny, nz].into_iter().fold(hash, add);
     }
     (hash ^ hash >> 32) as u32
 }
@@ -129,19 +131,28 @@ mod tests {
     }
 
     #[test]
-    fn cuts_fit_only_the_sites_they_were_made_for() {
+    fn cuts_fit_only_the_sites_and_the_kernel_they_were_made_for() {
+        let kernel = MovingLeastSquares::default();
         let sites = [1u32, 5, 6].map(|texel| Site {
             texel,
             position_rest: Vec3::new(texel as f32, 0.5, -2.0),
             normal_rest: Vec3::Y,
         });
-        let made = SetCuts { sites: 3, fingerprint: fingerprint(&sites), ..set(4, &[(1, 6)]) };
+        let made = SetCuts { sites: 3, fingerprint: fingerprint(&sites, &kernel), ..set(4, &[(1, 6)]) };
         let cuts = Cuts::new(vec![made]).unwrap();
-        let found = cuts.for_sites(4, &sites).unwrap();
+        let found = cuts.for_sites(4, &sites, &kernel).unwrap();
         assert_eq!([0, 1, 2].map(|site| found.mask(site)), [0, 6, 0]);
-        assert!(cuts.for_sites(3, &sites).is_none() && cuts.for_sites(4, &sites[..2]).is_none());
+        let fits = |instance, sites: &[Site]| cuts.for_sites(instance, sites, &kernel).is_some();
+        assert!(!fits(3, &sites) && !fits(4, &sites[..2]));
         let mut moved = sites;
         moved[2].position_rest.x += 1e-6;
-        assert!(cuts.for_sites(4, &moved).is_none());
+        assert!(!fits(4, &moved));
+        for other in [
+            MovingLeastSquares { radius: 2.5, ..kernel },
+            MovingLeastSquares { normal_power: 8, ..kernel },
+            MovingLeastSquares { plane: 512.0, ..kernel },
+        ] {
+            assert!(cuts.for_sites(4, &sites, &other).is_none(), "{other:?}");
+        }
     }
 }

@@ -20,11 +20,11 @@ impl Default for MovingLeastSquares {
     }
 }
 
-/// Below this sum of weights the fit means nothing.
-const LEAST_WEIGHT: f32 = 1e-9;
+/// Below this sum of weights a fit means nothing.
+pub const LEAST_WEIGHT: f32 = 1e-9;
 
 /// Pulls the gradient to zero where the points do not determine it (in units of the weights' sum and the squared radius).
-const RIDGE: f32 = 1e-3;
+pub const RIDGE: f32 = 1e-3;
 
 impl MovingLeastSquares {
     /// Weight of a point at `d` (in radii) from a place: (1 − |d|²)² · (n·nₚ)^power · plane factor, 0 … 1.

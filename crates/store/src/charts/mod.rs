@@ -24,7 +24,7 @@ mod weights;
 
 pub use atlas::{Atlas, AtlasError, Placement};
 pub use cuts::{Cuts, CutsError, SetCuts, SiteCut, fingerprint};
-pub use kernel::{Fit, MovingLeastSquares, Weighed};
+pub use kernel::{Fit, LEAST_WEIGHT, MovingLeastSquares, RIDGE, Weighed};
 pub use plan::{InstanceKey, SceneCharts};
 pub use set::{
     ChartBuilder, ChartError, ChartParams, ChartSet, ChartUv, ChartVertices, MOST_TEXELS, PageSize, Site,

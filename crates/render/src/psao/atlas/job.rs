@@ -144,7 +144,8 @@ impl VisibilityAtlas {
                 }
                 let neighbours = PointNeighbours::new(&layout, set, &self.params.weights);
                 cost = sites.len() / SITES_A_TEXEL;
-                let cuts = self.cuts.as_ref().and_then(|cuts| cuts.for_sites(set.instance, &sites));
+                let kernel = &self.params.weights.kernel;
+                let cuts = self.cuts.as_ref().and_then(|cuts| cuts.for_sites(set.instance, &sites, kernel));
                 let cuts = cuts.map_or(Vec::new(), |set| set.cuts.clone());
                 Stage::Weigh(Box::new(Builder::new(neighbours, set, sites, cuts, texels)))
             }

@@ -30,7 +30,7 @@ use resolve::{PointTexels, Sums};
 pub struct AtlasParams {
     /// How the points of a texel are chosen and weighed.
     pub weights: WeightParams,
-    /// Factor on the edge of texels, > 0. Default 1: [`ChartParams::for_spacing`].
+    /// Factor on the edge of texels, > 0. Default 1: [`ChartParams::for_spacing`](dapple_store::charts::ChartParams::for_spacing).
     pub texel_factor: f32,
     /// Most texels of all instances together, gaps between pages not counted: an instance beyond stays open
     /// ([`VisibilityAtlas::failed`]). Texels are as fine as the layout says that points are dense, and a layout comes from

@@ -447,7 +447,8 @@ fn leak(cut: bool) -> f32 {
             cuts.push(SiteCut { site: i, mask });
         }
     }
-    let made = SetCuts { instance: 0, sites: sites.len() as u32, fingerprint: fingerprint(&sites), cuts };
+    let fingerprint = fingerprint(&sites, &WeightParams::default().kernel);
+    let made = SetCuts { instance: 0, sites: sites.len() as u32, fingerprint, cuts };
     let cuts = Cuts::new(vec![made]).unwrap();
     let mut atlas =
         VisibilityAtlas::new(layout.clone(), &scene, cut.then_some(&cuts), AtlasParams::default());

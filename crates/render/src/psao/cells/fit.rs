@@ -1,9 +1,6 @@
 //! The fit of a plane in one pass over the points, as `cells.wgsl` does it: sums, then the plane's value.
 
-/// Below this sum of weights the fit means nothing.
-const LEAST_WEIGHT: f32 = 1e-9;
-/// Pulls the gradient to zero where the points do not determine it.
-const RIDGE: f32 = 1e-3;
+use dapple_store::charts::{LEAST_WEIGHT, RIDGE};
 
 /// Weighted normal equations of value ≈ a + b·u + c·v.
 #[derive(Debug)]

@@ -77,7 +77,8 @@ pub fn find_cuts(
             offset: if rests { Vec3::ZERO } else { Vec3::from(posed.world_from_mesh.translation) },
             lift_m: LIFT * layout.spacing_m(),
         };
-        let neighbours = PointNeighbours::new(layout, set, &WeightParams::default());
+        let weights = WeightParams::default();
+        let neighbours = PointNeighbours::new(layout, set, &weights);
         let cuts: Vec<SiteCut> = sites
             .par_iter()
             .enumerate()
@@ -95,7 +96,7 @@ pub fn find_cuts(
             found.push(SetCuts {
                 instance: set.instance,
                 sites: sites.len() as u32,
-                fingerprint: fingerprint(&sites),
+                fingerprint: fingerprint(&sites, &weights.kernel),
                 cuts,
             });
         }

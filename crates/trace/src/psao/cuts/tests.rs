@@ -79,7 +79,7 @@ fn a_wall_cuts_exactly_what_lies_beyond_it() {
     let params = ChartParams::for_spacing(layout.spacing_m(), false);
     let charts = ChartSet::new(&positions, &scene.meshes[0].triangles, &params).unwrap();
     let sites = charts.sites(&positions, &scene.meshes[0].triangles);
-    let own = cuts.for_sites(0, &sites).expect("made for these sites");
+    let own = cuts.for_sites(0, &sites, &WeightParams::default().kernel).expect("made for these sites");
     assert!(own.cuts.len() > 20);
     let neighbours = PointNeighbours::new(&layout, set, &WeightParams::default());
     let mut weigher = neighbours.weigher(set);
