@@ -336,7 +336,7 @@ mod tests {
         let mut fading = Vec::new();
         // Away, back and away again.
         for value in [55, 255, 55] {
-            pages.write(0, value, &mut fading);
+            pages.write(0, 1, &mut fading).next(value);
         }
         assert_eq!(fading, [0]);
         // Its page is asked to go on as well, and leaves it to the list.
