@@ -7,6 +7,9 @@ use super::quality::{METHODS, PRESETS, Quality, VIEWS, name_of};
 use super::show::{Figures, Show};
 use crate::args::Preset;
 
+/// Width of the panel, in the overlay's units.
+const PANEL_WIDTH: f32 = 240.0;
+
 /// Every key and what it does.
 pub(super) const KEYS: [(&str, &str); 16] = [
     ("drag", "turn; on foot: look around"),
@@ -17,7 +20,7 @@ pub(super) const KEYS: [(&str, &str); 16] = [
     ("C", "next camera of the scene"),
     ("F", "all of the scene"),
     ("Space", "pause, go on"),
-    ("← →, Home", "one update back or ahead, the beginning"),
+    ("Left, Right, Home", "one update back or ahead, the beginning"),
     ("M", "next method"),
     ("B", "split screen; drag the line"),
     ("V, 1 to 8", "next view; that view"),
@@ -66,24 +69,26 @@ impl Overlay {
             time_bar(ui, show);
             let figures = show.figures(now_s);
             let room = (ctx.content_rect().height() - 60.0).max(60.0);
-            egui::Window::new("dapple")
-                .anchor(Align2::LEFT_TOP, vec2(8.0, 8.0))
-                .resizable(false)
-                .vscroll(true)
-                .max_height(room)
-                .show(&ctx, |ui| {
-                    figures_grid(ui, show, &figures);
-                    ui.separator();
-                    wish = choices(ui, show);
-                    ui.horizontal(|ui| {
-                        if ui.button("Screenshot").clicked() {
-                            wish = Some(Wish::Screenshot);
-                        }
-                        if ui.button("Help (H)").clicked() {
-                            self.help = !self.help;
-                        }
+            egui::Window::new("dapple").anchor(Align2::LEFT_TOP, vec2(8.0, 8.0)).resizable(false).show(
+                &ctx,
+                |ui| {
+                    // The window's own scrolling would keep the height of a smaller window.
+                    ui.set_max_width(PANEL_WIDTH);
+                    egui::ScrollArea::vertical().max_height(room).show(ui, |ui| {
+                        figures_grid(ui, show, &figures);
+                        ui.separator();
+                        wish = choices(ui, show);
+                        ui.horizontal(|ui| {
+                            if ui.button("Screenshot").clicked() {
+                                wish = Some(Wish::Screenshot);
+                            }
+                            if ui.button("Help (H)").clicked() {
+                                self.help = !self.help;
+                            }
+                        });
                     });
-                });
+                },
+            );
         }
         divider(&ctx, show);
         self.messages(&ctx, show, now_s);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dapple_scene::PosedCamera;
+use dapple_scene::{PosedCamera, Projection};
 use dapple_store::charts::{Atlas, ChartParams, ChartSet, Placement};
 use glam::{Affine3A, Vec3};
 
@@ -10,6 +10,7 @@ use super::super::{AtlasBand, FrameInputs, LookupId, Rect, View, ViewKind};
 use super::harness::{Bench, inputs, save};
 use crate::gbuffer::{GBuffer, rasterize};
 use crate::image::Rgb8Image;
+use crate::projection;
 use crate::shade::ShadeParams;
 use crate::testing::{Stage, cube, ground, sphere, turned};
 
@@ -42,6 +43,9 @@ impl Charted {
         stage.scene.instances[2].mesh = stage.scene.instances[ball as usize].mesh;
         stage.scene.instances[2].rest_from_mesh = stage.scene.instances[ball as usize].rest_from_mesh;
         stage.add(cube(), 0, turned(0.7, Vec3::new(1.6, 1.3, -0.4)));
+        // Mirrored, and stretched.
+        let odd = Affine3A::from_scale(Vec3::new(-0.4, 0.7, 0.5));
+        stage.add(cube(), 0, Affine3A::from_translation(Vec3::new(0.6, 0.7, 2.0)) * odd);
         let mut atlas = Atlas::new(side, 64);
         let mut charted =
             Charted { stage, charts: Vec::new(), places: Vec::new(), side: side.into(), layers: Vec::new() };
@@ -117,17 +121,25 @@ fn camera() -> PosedCamera {
 }
 
 fn draw(bench: &mut Bench, charted: &Charted, kind: ViewKind, fade: f32) -> Rgb8Image {
+    draw_from(bench, charted, &[View { kind, ..View::new(camera(), LookupId::ATLAS) }], fade)
+}
+
+fn draw_from(bench: &mut Bench, charted: &Charted, views: &[View<'_>], fade: f32) -> Rgb8Image {
     let params = ShadeParams::default();
-    let views = [View { kind, ..View::new(camera(), LookupId::ATLAS) }];
-    let inputs = FrameInputs { fade, ..inputs(&charted.stage.pose, &params, &views) };
+    let inputs = FrameInputs { fade, ..inputs(&charted.stage.pose, &params, views) };
     bench.draw(SIZE, &inputs)
 }
 
 /// Fails unless nearly all covered samples show what reading by hand gives.
 fn check(name: &str, bench: &mut Bench, charted: &Charted, fade: f32) {
     let picture = draw(bench, charted, ViewKind::Visibility, fade);
-    save(name, &picture);
-    let gbuffer = rasterize(&charted.stage.scene, &charted.stage.pose, &camera(), SIZE.0, SIZE.1, 1).unwrap();
+    check_picture(name, &picture, charted, &camera(), fade);
+}
+
+fn check_picture(name: &str, picture: &Rgb8Image, charted: &Charted, camera: &PosedCamera, fade: f32) {
+    save(name, picture);
+    let (width, height) = (picture.width, picture.height);
+    let gbuffer = rasterize(&charted.stage.scene, &charted.stage.pose, camera, width, height, 1).unwrap();
     let (mut covered, mut near, mut sum) = (0, 0, 0.0);
     for (i, pixel) in picture.pixels.iter().enumerate() {
         if let Some(expected) = charted.visibility(&gbuffer, i, fade) {
@@ -154,10 +166,78 @@ fn a_fragment_reads_its_texels() {
     );
     let meshes = bench.scene.meshes.len();
     charted.upload(&mut bench);
-    assert_eq!(bench.scene.meshes.len(), meshes + 3, "instances with the same charts share vertices");
+    assert_eq!(bench.scene.meshes.len(), meshes + 4, "instances with the same charts share vertices");
     for (name, fade) in [("atlas-old", 0.0), ("atlas-half", 0.5), ("atlas-new", 1.0)] {
         check(name, &mut bench, &charted, fade);
     }
+}
+
+#[test]
+fn parallel_cameras_read_the_same_texels() {
+    let charted = Charted::new(128, 0.06);
+    let Some(mut bench) = Bench::new(&charted.stage.scene, 1, &[]) else { return };
+    charted.upload(&mut bench);
+    let projection = Projection::Orthographic { half_height: 2.2, near: 0.1, far: 30.0 };
+    let camera = PosedCamera { projection, ..camera() };
+    let view = View { kind: ViewKind::Visibility, ..View::new(camera, LookupId::ATLAS) };
+    let picture = draw_from(&mut bench, &charted, &[view], 0.5);
+    check_picture("atlas-parallel", &picture, &charted, &camera, 0.5);
+}
+
+#[test]
+fn both_eyes_see_the_same_visibility_at_the_same_place() {
+    let charted = Charted::new(128, 0.06);
+    let Some(mut bench) = Bench::new(&charted.stage.scene, 1, &[]) else { return };
+    charted.upload(&mut bench);
+    let eyes = [-0.032, 0.032].map(|x| {
+        let mut eye = camera();
+        eye.world_from_view *= Affine3A::from_translation(Vec3::new(x, 0.0, 0.0));
+        eye
+    });
+    let (width, height) = (SIZE.0, SIZE.1);
+    let view = |i: usize| View {
+        kind: ViewKind::Visibility,
+        viewport: Some(Rect { x: i as u32 * width, y: 0, width, height }),
+        ..View::new(eyes[i], LookupId::ATLAS)
+    };
+    let params = ShadeParams::default();
+    let views = [view(0), view(1)];
+    let inputs = FrameInputs { fade: 0.5, ..inputs(&charted.stage.pose, &params, &views) };
+    let pair = bench.draw((2 * width, height), &inputs);
+    save("atlas-stereo", &pair);
+    let scene = &charted.stage.scene;
+    let [left, right] =
+        eyes.map(|eye| rasterize(scene, &charted.stage.pose, &eye, width, height, 1).expect("it draws"));
+    let clip_from_world = projection::clip_from_world(&eyes[1], width, height).expect("a sound camera");
+    let (mut seen, mut near, mut moved) = (0, 0, 0);
+    for (i, sample) in left.samples().iter().enumerate().filter(|(_, s)| s.is_covered()) {
+        let mesh = &scene.meshes[scene.instances[sample.instance as usize].mesh as usize];
+        let corners = mesh.triangles[sample.triangle as usize].map(|v| mesh.positions[v as usize]);
+        let [b, c] = sample.barycentrics;
+        let place_mesh = corners[0] * (1.0 - b - c) + corners[1] * b + corners[2] * c;
+        let pose = &charted.stage.pose.instances[sample.instance as usize];
+        let clip = clip_from_world * pose.world_from_mesh.transform_point3(place_mesh).as_dvec3().extend(1.0);
+        let x = ((clip.x / clip.w + 1.0) * 0.5 * f64::from(width)).floor();
+        let y = ((1.0 - clip.y / clip.w) * 0.5 * f64::from(height)).floor();
+        if x < 0.0 || y < 0.0 || x >= f64::from(width) || y >= f64::from(height) {
+            continue;
+        }
+        let (x, y) = (x as usize, y as usize);
+        let other = &right.samples()[y * width as usize + x];
+        if (other.instance, other.triangle) != (sample.instance, sample.triangle) {
+            continue;
+        }
+        let (row, column) = (i / width as usize, i % width as usize);
+        let at = |x: usize, y: usize| pair.pixels[y * 2 * width as usize + x][0];
+        let difference = at(column, row).abs_diff(at(width as usize + x, y));
+        seen += 1;
+        moved += usize::from(x != column);
+        // The pixel's middle lies up to half a pixel beside the place.
+        near += usize::from(difference <= 6);
+    }
+    let (near, moved) = (near as f32 / seen as f32, moved as f32 / seen as f32);
+    assert!(seen > 5000 && moved > 0.5, "{seen} places seen by both eyes, {moved} of them elsewhere");
+    assert!(near > 0.95, "{near} of {seen} places look alike to both eyes");
 }
 
 #[test]
