@@ -117,12 +117,120 @@ impl Runner {
             Step::Seams => seams::check(&self.metadata),
             Step::Tidy => tidy::check(self.root()),
             Step::Page => self.page(),
+            Step::Smoke => self.smoke(),
+            Step::DocTests => "documentation examples",
+            Step::Tests => "tests",
+        }
+    }
+}
+
+/// Runs steps and remembers how they ended.
+pub(crate) struct Runner {
+    metadata: Metadata,
+    passed: Vec<Step>,
+    failed: Vec<Step>,
+    skipped: Vec<String>,
+}
+
+impl Runner {
+    /// For the workspace that `metadata` describes.
+    pub(crate) fn new(metadata: Metadata) -> Self {
+        Self { metadata, passed: Vec::new(), failed: Vec::new(), skipped: Vec::new() }
+    }
+
+    /// Runs the steps in order.
+    pub(crate) fn run(&mut self, steps: &[Step]) {
+        for &step in steps {
+            println!("\n== {}", step.name());
+            match self.run_step(step) {
+                Ok(()) => self.passed.push(step),
+                Err(error) => {
+                    eprintln!("{}: {error:#}", step.name());
+                    self.failed.push(step);
+                }
+            }
+        }
+    }
+
+    /// Notes that something was left out.
+    pub(crate) fn skip(&mut self, line: &str) {
+        println!("\n{line}");
+        self.skipped.push(line.to_owned());
+    }
+
+    /// Prints what was skipped, passed and failed; an error if anything failed.
+    pub(crate) fn finish(self) -> Result<()> {
+        println!();
+        for line in &self.skipped {
+            println!("{line}");
+        }
+        if !self.passed.is_empty() {
+            println!("passed: {}", names(&self.passed));
+        }
+        if !self.failed.is_empty() {
+            bail!("failed: {}", names(&self.failed));
+        }
+        Ok(())
+    }
+
+    fn run_step(&mut self, step: Step) -> Result<()> {
+        match step {
+            Step::Format => self.cargo(&["fmt", "--all", "--check"]),
+            Step::Clippy => self.cargo(&[
+                "clippy",
+                "--workspace",
+                "--all-targets",
+                "--all-features",
+                "--",
+                "--deny=warnings",
+            ]),
+            Step::ThinClient => self.cargo(&[
+                "clippy",
+                "--package=dapple-client",
+                "--no-default-features",
+                "--",
+                "--deny=warnings",
+            ]),
+            Step::Seams => seams::check(&self.metadata),
+            Step::Tidy => tidy::check(self.root()),
+            Step::Page => self.page(),
             Step::Smoke => {
-                self.cargo(&["run", "--profile=dev", "--quiet", "--package=dapple", "--", "eval", "--smoke"])
+                // The same selection of packages and features as the tests: nothing is compiled twice.
+                self.cargo(&[
+                    "run",
+                    "--profile=dev",
+                    "--quiet",
+                    "--all-features",
+                    "--bin=dapple",
+                    "--",
+                    "eval",
+                    "--smoke",
+                ])
             }
             Step::DocTests => self.cargo(&["test", "--doc", "--workspace", "--all-features"]),
             Step::Tests => self.tests(),
         }
+    }
+
+    fn smoke(&self) -> Result<()> {
+        // The same packages and features as the tests, so that nothing is compiled twice; `cargo run` would choose others.
+        self.cargo(&["build", "--quiet", "--workspace", "--all-features", "--bin=dapple"])?;
+        let program = self
+            .metadata
+            .target_directory
+            .join("debug/dapple")
+            .with_extension(std::env::consts::EXE_EXTENSION);
+        println!("{program} eval --smoke");
+        let status = Command::new(&program)
+            .args(["eval", "--smoke"])
+            .current_dir(self.root())
+            .stdin(Stdio::null())
+            .status()
+            .with_context(|| format!("cannot start {program}"))?;
+        if !status.success() {
+            bail!("`dapple eval --smoke` ended with {status}");
+        }
+        Ok(())
     }
 
     fn page(&self) -> Result<()> {

@@ -345,7 +345,7 @@ mod tests {
         assert_eq!((pages.texel(0, 0, 0), fading.as_slice()), ([205, 55], [0].as_slice()));
         pages.advance(&mut fading, 1.0);
         assert_eq!((pages.texel(0, 0, 0), fading.len()), ([55, 55], 0));
-        pages.write(0, 56, &mut fading);
+        pages.write(0, 1, &mut fading).next(56);
         assert_eq!(fading, [0], "it can fade again");
     }
 }
