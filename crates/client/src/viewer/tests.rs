@@ -230,7 +230,8 @@ fn an_update_in_the_middle_of_a_fade_goes_on_from_what_is_shown() {
         viewer.receive(&frame.bytes, now_s).expect("it is sound");
         let after = picture(&gpu, &mut viewer, 0.0, now_s, &options);
         let jump = before.iter().zip(&after).map(|(a, b)| a[0].abs_diff(b[0])).max();
-        assert!(jump <= Some(1), "update {tick}: a pixel jumps by {jump:?}");
+        // Old values are rounded to a code, and cards may filter in whole codes; without going on it would be tens.
+        assert!(jump <= Some(2), "update {tick}: a pixel jumps by {jump:?}");
     }
 }
 
