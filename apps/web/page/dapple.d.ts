@@ -50,6 +50,8 @@ export interface Stats {
   time: number;
   duration: number;
   playing: boolean;
+  /** Why the chosen method cannot show the points, so that the scene is drawn without occlusion; null where it can. */
+  problem: string | null;
 }
 
 export interface Options {

@@ -76,6 +76,8 @@ function onStats(stats) {
   byId("changed").textContent = `${Math.round(stats.changedPerSecond).toLocaleString("en")} /s`;
   byId("age").textContent = stats.age === null ? "–" : age(stats.age);
   byId("backend").textContent = stats.backend === "webgpu" ? "WebGPU" : "WebGL2";
+  byId("problem").textContent = stats.problem ?? "";
+  byId("problem").hidden = stats.problem === null;
   showTime(stats);
   if (viewer) followCamera();
 }
