@@ -51,7 +51,7 @@ pub(super) fn check(results: &Results) -> Result<()> {
         let kbit = row.kbit_per_s.unwrap_or(0.0);
         let (snapshot, cuts) = (row.snapshot_bytes.unwrap_or(0), row.cut_bytes.unwrap_or(0));
         let points = row.points.unwrap_or(1).max(1) as f64;
-        let per_point = (snapshot - cuts) as f64 / points;
+        let per_point = (snapshot as f64 - cuts as f64) / points;
         let cuts_per_point = cuts as f64 / points;
         let method = bound.method;
         check(

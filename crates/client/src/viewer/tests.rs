@@ -177,18 +177,30 @@ fn surfaces_seen_from_both_sides_have_light_on_both() {
     assert!(backs > 3000, "{backs} pixels show a back");
 }
 
+/// A server of the atrium, and a viewer that has joined it.
+fn joined(gpu: &Gpu) -> (Server, Viewer) {
+    let scene = atrium();
+    let mut server = server(&scene, 32.0);
+    let mut viewer = viewer(gpu, &scene);
+    let snapshot = server.join().expect("it can be encoded").expect("there is one");
+    viewer.receive(&snapshot.bytes, 0.0).expect("it is sound");
+    (server, viewer)
+}
+
+/// Lets all surfaces have their light and their fades end, by 9 s; gives options to show visibility with, fading for 0.5 s.
+fn at_rest(gpu: &Gpu, viewer: &mut Viewer) -> DrawOptions {
+    let options = DrawOptions { view: DebugView::Visibility, fade_s: Some(0.5), ..DrawOptions::default() };
+    picture(gpu, viewer, 0.0, 0.0, &options);
+    work_to_the_end(viewer, usize::MAX);
+    picture(gpu, viewer, 0.0, 9.0, &options);
+    options
+}
+
 #[test]
 fn a_fade_goes_from_the_last_update_to_this_one() {
     let Some(gpu) = gpu_for_tests() else { return };
-    let scene = atrium();
-    let mut server = server(&scene, 32.0);
-    let mut viewer = viewer(&gpu, &scene);
-    let snapshot = server.join().expect("it can be encoded").expect("there is one");
-    viewer.receive(&snapshot.bytes, 0.0).expect("it is sound");
-    let options = DrawOptions { view: DebugView::Visibility, fade_s: Some(0.5), ..DrawOptions::default() };
-    picture(&gpu, &mut viewer, 0.0, 0.0, &options);
-    work_to_the_end(&mut viewer, usize::MAX);
-    picture(&gpu, &mut viewer, 0.0, 9.0, &options);
+    let (mut server, mut viewer) = joined(&gpu);
+    let options = at_rest(&gpu, &mut viewer);
     // The scene's time stands still, so that only visibility changes.
     let before = picture(&gpu, &mut viewer, 0.0, 10.0, &options);
     let frame = server.step(1.0).expect("it steps").frame.expect("something moved");
@@ -214,15 +226,8 @@ fn a_fade_goes_from_the_last_update_to_this_one() {
 #[test]
 fn an_update_in_the_middle_of_a_fade_goes_on_from_what_is_shown() {
     let Some(gpu) = gpu_for_tests() else { return };
-    let scene = atrium();
-    let mut server = server(&scene, 32.0);
-    let mut viewer = viewer(&gpu, &scene);
-    let snapshot = server.join().expect("it can be encoded").expect("there is one");
-    viewer.receive(&snapshot.bytes, 0.0).expect("it is sound");
-    let options = DrawOptions { view: DebugView::Visibility, fade_s: Some(0.5), ..DrawOptions::default() };
-    picture(&gpu, &mut viewer, 0.0, 0.0, &options);
-    work_to_the_end(&mut viewer, usize::MAX);
-    picture(&gpu, &mut viewer, 0.0, 9.0, &options);
+    let (mut server, mut viewer) = joined(&gpu);
+    let options = at_rest(&gpu, &mut viewer);
     for tick in 0..4 {
         let now_s = 10.0 + 0.2 * f64::from(tick);
         let before = picture(&gpu, &mut viewer, 0.0, now_s, &options);
@@ -238,11 +243,7 @@ fn an_update_in_the_middle_of_a_fade_goes_on_from_what_is_shown() {
 #[test]
 fn every_view_and_method_draws_and_a_split_shows_both() {
     let Some(gpu) = gpu_for_tests() else { return };
-    let scene = atrium();
-    let mut server = server(&scene, 32.0);
-    let mut viewer = viewer(&gpu, &scene);
-    let snapshot = server.join().expect("it can be encoded").expect("there is one");
-    viewer.receive(&snapshot.bytes, 0.0).expect("it is sound");
+    let (_, mut viewer) = joined(&gpu);
     work_to_the_end(&mut viewer, usize::MAX);
     let mut pictures = Vec::new();
     use DebugView::{Age, Beauty, Error, Normal, Points, Texels, Visibility, Weights};

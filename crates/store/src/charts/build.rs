@@ -6,7 +6,7 @@ use super::flatten::Flat;
 use super::grow::{GrowParams, Grown, Growth};
 use super::pack::{Packed, pack};
 use super::per_vertex::vertex_pages;
-use super::set::{Chart, ChartError, ChartParams, ChartUv, MOST_TEXELS, PageSize};
+use super::set::{Chart, ChartError, ChartParams, ChartSet, ChartUv, MOST_TEXELS, PageSize};
 use super::surface::{NONE, Surface};
 
 /// Rows of texels that slivers may cross, together, before texels are made coarser: it bounds the time taken.
@@ -18,7 +18,7 @@ const FINE_PART: f64 = 0.9;
 /// Tries to find a texel edge that keeps to [`MOST_TEXELS`].
 const MOST_TRIES: usize = 12;
 
-/// What a [`super::ChartSet`] is made of.
+/// What a [`ChartSet`] is made of.
 #[derive(Debug, Default)]
 pub(super) struct Layout {
     pub(super) pages: Vec<PageSize>,
@@ -30,9 +30,10 @@ pub(super) struct Layout {
     pub(super) texel: f64,
 }
 
-/// Makes the charts of a mesh a piece at a time.
+/// Makes the charts of a mesh a piece at a time, where a thread must not be held up: the same charts as
+/// [`ChartSet::new`], to the bit.
 #[derive(Debug)]
-pub(super) struct LayoutBuilder {
+pub struct ChartBuilder {
     surface: Surface,
     params: ChartParams,
     vertices: usize,
@@ -42,25 +43,46 @@ pub(super) struct LayoutBuilder {
     growth: Growth,
 }
 
-impl LayoutBuilder {
-    /// `params` and indices are checked.
-    pub(super) fn new(positions: &[Vec3], triangles: &[[u32; 3]], params: &ChartParams) -> LayoutBuilder {
-        let surface = Surface::new(positions, triangles);
+impl ChartBuilder {
+    /// Takes in the mesh: the one step, linear in its triangles, that is not cut in pieces.
+    ///
+    /// # Errors
+    ///
+    /// A parameter out of range, a triangle that names a vertex which is not there.
+    pub fn new(
+        positions_rest: &[Vec3],
+        triangles: &[[u32; 3]],
+        params: &ChartParams,
+    ) -> Result<ChartBuilder, ChartError> {
+        params.check()?;
+        let count = positions_rest.len();
+        for (triangle, corners) in triangles.iter().enumerate() {
+            if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= count) {
+                return Err(ChartError::BadVertex { triangle, vertex, count });
+            }
+        }
+        let surface = Surface::new(positions_rest, triangles);
         let texel = first_texel(&surface, params);
         let growth = Growth::new(&surface, grow_params(params, texel));
-        let (params, vertices, triangles) = (*params, positions.len(), triangles.to_vec());
-        LayoutBuilder { surface, params, vertices, triangles, texel, tries: 0, growth }
+        let (params, triangles) = (*params, triangles.to_vec());
+        Ok(ChartBuilder { surface, params, vertices: count, triangles, texel, tries: 0, growth })
     }
 
-    /// Goes on until about `budget` triangles and texels were looked at; gives how many were, and what came out once all
-    /// is done. Call it no more after that.
-    pub(super) fn work(&mut self, budget: usize) -> (usize, Option<Result<Layout, ChartError>>) {
+    /// Goes on until about `budget` triangles and texels were looked at (at least one chart is grown); gives how many were,
+    /// and the charts once they are done. Call it no more after that.
+    ///
+    /// # Errors
+    ///
+    /// More than [`MOST_TEXELS`] loose pieces.
+    pub fn work(&mut self, budget: usize) -> Result<(usize, Option<ChartSet>), ChartError> {
+        let mirrored = self.params.mirrored;
+        let done = |spent, layout| Ok((spent, Some(ChartSet::of_layout(layout, mirrored))));
         if self.triangles.is_empty() {
-            return (0, Some(Ok(Layout::default())));
+            return done(0, Layout::default());
         }
         let mut spent = self.growth.work(&self.surface, budget);
         if !self.growth.is_complete() {
-            return (spent, None);
+            return Ok((spent, None));
         }
         spent += self.triangles.len();
         let flat = Flattened::new(&self.surface, self.growth.take_charts(), self.texel);
@@ -73,31 +95,26 @@ impl LayoutBuilder {
                 vertex_pages(&self.surface, self.vertices, &self.triangles, self.params.max_side, fewer);
             if let Some(found) = found {
                 let (pages, corners, texel) = (found.pages, found.corners, self.texel);
-                let layout = Layout { pages, corners, per_vertex: true, texel, ..Layout::default() };
-                return (spent, Some(Ok(layout)));
+                return done(spent, Layout { pages, corners, per_vertex: true, texel, ..Layout::default() });
             }
         }
         if count <= u64::from(MOST_TEXELS) {
-            return (spent, Some(Ok(flat.place(&self.surface, packed, self.texel))));
+            return done(spent, flat.place(&self.surface, packed, self.texel));
         }
         self.tries += 1;
         if self.tries == MOST_TRIES {
             let (charts, limit) = (flat.charts.len(), MOST_TEXELS);
-            return (spent, Some(Err(ChartError::TooManyPieces { charts, limit })));
+            return Err(ChartError::TooManyPieces { charts, limit });
         }
         self.texel *= (count as f64 / f64::from(MOST_TEXELS)).sqrt().clamp(1.1, 64.0) * 1.02;
-        self.growth = Growth::new(&self.surface, self.grow_params());
-        (spent, None)
+        self.growth = Growth::new(&self.surface, grow_params(&self.params, self.texel));
+        Ok((spent, None))
     }
 
     /// Part of the work that is left, 0 … 1, as far as can be told.
-    pub(super) fn left(&self) -> f64 {
+    pub fn left(&self) -> f64 {
         let (left, all) = self.growth.seeds();
         left as f64 / all.max(1) as f64
-    }
-
-    fn grow_params(&self) -> GrowParams {
-        grow_params(&self.params, self.texel)
     }
 }
 

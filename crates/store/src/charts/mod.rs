@@ -23,12 +23,13 @@ mod tests;
 mod weights;
 
 pub use atlas::{Atlas, AtlasError, Placement};
+pub use build::ChartBuilder;
 pub use cuts::{Cuts, CutsError, SetCuts, SiteCut, fingerprint};
 pub use kernel::{Fit, LEAST_WEIGHT, MovingLeastSquares, RIDGE, Weighed};
 pub use plan::{InstanceKey, SceneCharts};
 pub use set::{
-    ChartBuilder, ChartError, ChartParams, ChartSet, ChartUv, ChartVertices, MOST_TEXELS, PageSize, Site,
-    SiteFinder, TEXEL_FRACTION,
+    ChartError, ChartParams, ChartSet, ChartUv, ChartVertices, MOST_TEXELS, PageSize, Site, SiteFinder,
+    TEXEL_FRACTION,
 };
 pub use sides::add_back_sites;
 pub use weights::{

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::build::{Layout, LayoutBuilder};
+use super::build::{ChartBuilder, Layout};
 use super::flatten::Flat;
 use super::per_vertex::vertex_sites;
 
@@ -38,7 +38,7 @@ impl ChartParams {
         ChartParams { texel_m, least_cosine: 0.8, max_side: 1024, mirrored: false }
     }
 
-    fn check(&self) -> Result<(), ChartError> {
+    pub(super) fn check(&self) -> Result<(), ChartError> {
         let rules = [
             (
                 "texel_m",
@@ -166,53 +166,6 @@ pub struct ChartSet {
     lone: Option<u32>,
 }
 
-/// Makes the charts of a mesh a piece at a time, where a thread must not be held up: the same charts as
-/// [`ChartSet::new`], to the bit.
-#[derive(Debug)]
-pub struct ChartBuilder {
-    layout: LayoutBuilder,
-    mirrored: bool,
-}
-
-impl ChartBuilder {
-    /// Takes in the mesh: the one step, linear in its triangles, that is not cut in pieces.
-    ///
-    /// # Errors
-    ///
-    /// A parameter out of range, a triangle that names a vertex which is not there.
-    pub fn new(
-        positions_rest: &[Vec3],
-        triangles: &[[u32; 3]],
-        params: &ChartParams,
-    ) -> Result<ChartBuilder, ChartError> {
-        params.check()?;
-        let count = positions_rest.len();
-        for (triangle, corners) in triangles.iter().enumerate() {
-            if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= count) {
-                return Err(ChartError::BadVertex { triangle, vertex, count });
-            }
-        }
-        let layout = LayoutBuilder::new(positions_rest, triangles, params);
-        Ok(ChartBuilder { layout, mirrored: params.mirrored })
-    }
-
-    /// Goes on until about `budget` triangles and texels were looked at (at least one chart is grown); gives how many were,
-    /// and the charts once they are done. Call it no more after that.
-    ///
-    /// # Errors
-    ///
-    /// More than [`MOST_TEXELS`] loose pieces.
-    pub fn work(&mut self, budget: usize) -> Result<(usize, Option<ChartSet>), ChartError> {
-        let (spent, layout) = self.layout.work(budget);
-        Ok((spent, layout.transpose()?.map(|layout| ChartSet::of_layout(layout, self.mirrored))))
-    }
-
-    /// Part of the work that is left, 0 … 1, as far as can be told.
-    pub fn left(&self) -> f64 {
-        self.layout.left()
-    }
-}
-
 /// A chart in its page.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Chart {
@@ -258,7 +211,7 @@ impl ChartSet {
         }
     }
 
-    fn of_layout(layout: Layout, mirrored: bool) -> ChartSet {
+    pub(super) fn of_layout(layout: Layout, mirrored: bool) -> ChartSet {
         let Layout { pages, per_vertex, corners, chart_of, charts, lone, texel } = layout;
         let mut first_texels = vec![0u32];
         for page in &pages {
