@@ -15,4 +15,4 @@ pub mod sampling;
 #[cfg(test)]
 mod test_support;
 
-pub use bvh::{BlockedMask, Hit, MAX_DIRECTIONS, Ray, Tracer, count_blocked, offset_origin};
+pub use bvh::{BlockedMask, Blockers, Hit, MAX_DIRECTIONS, Ray, Tracer, count_blocked, offset_origin};

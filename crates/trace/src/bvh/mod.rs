@@ -2,7 +2,8 @@
 //!
 //! - **Lower level**: one tree for each mesh, in mesh space, shared by its rigid instances; one of its own for each
 //!   deformed instance, refitted when it moves.
-//! - **Upper level**: a small tree over the instances' boxes in the world, built anew each update.
+//! - **Upper level**: two small trees over the instances' boxes in the world: of those that move, built anew each
+//!   update, and of all others.
 //!
 //! Trees are eight wide with boxes side by side in arrays, built by a binned surface-area heuristic. Triangles are
 //! tested by the watertight algorithm of \[Woop2013\]: rays do not slip through shared edges or corners of one mesh.
@@ -21,13 +22,15 @@ mod triangle;
 #[cfg(test)]
 mod brute_force;
 #[cfg(test)]
+mod movers;
+#[cfg(test)]
 mod tests;
 #[cfg(test)]
 mod timing;
 
 use dapple_scene::glam::Vec3;
 
-pub use tracer::Tracer;
+pub use tracer::{Blockers, Tracer};
 
 /// Most directions in one [`Tracer::occlusion`] query.
 pub const MAX_DIRECTIONS: usize = 256;

@@ -33,8 +33,44 @@ pub struct Tracer {
     rigid: Vec<Option<Arc<MeshBvh>>>,
     /// Parallel to the scene's instances; `None` for those that cannot be hit.
     instances: Vec<Option<PlacedBvh>>,
-    /// Over world boxes; `top.order` holds instance indices.
-    top: Tree,
+    /// Parallel to the scene's instances.
+    movers: Vec<bool>,
+    still: Top,
+    moving: Top,
+}
+
+/// Which instances a query asks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Blockers {
+    /// All of them.
+    All,
+    /// Those that are not movers ([`Tracer::set_movers`]).
+    Still,
+    /// Movers alone.
+    Movers,
+}
+
+/// A tree over instances, and what it was built from.
+#[derive(Clone, Default)]
+struct Top {
+    indices: Vec<u32>,
+    boxes: Vec<Aabb>,
+    /// `tree.order` holds instance indices.
+    tree: Tree,
+}
+
+impl Top {
+    /// Builds the tree if the boxes are not those that it was built from.
+    fn update(&mut self, (indices, boxes): (Vec<u32>, Vec<Aabb>)) {
+        if self.indices == indices && self.boxes == boxes {
+            return;
+        }
+        self.tree = build(&boxes);
+        for index in &mut self.tree.order {
+            *index = indices[*index as usize];
+        }
+        (self.indices, self.boxes) = (indices, boxes);
+    }
 }
 
 /// A mesh's tree where it stands.
@@ -127,7 +163,9 @@ impl Tracer {
             mesh_alpha,
             rigid: vec![None; scene.meshes.len()],
             instances: vec![None; scene.instances.len()],
-            top: Tree::default(),
+            movers: vec![false; scene.instances.len()],
+            still: Top::default(),
+            moving: Top::default(),
         };
         tracer.place(scene, pose);
         tracer
@@ -223,50 +261,113 @@ impl Tracer {
         tracer
     }
 
+    /// Those of the upper trees whose boxes changed: while only movers move that is theirs alone.
     fn build_top(&mut self) {
-        let (indices, boxes): (Vec<u32>, Vec<Aabb>) = (0_u32..)
-            .zip(&self.instances)
-            .filter_map(|(i, placed)| placed.as_ref().map(|p| (i, p.bounds_world)))
-            .filter(|(_, bounds)| !bounds.is_empty())
-            .unzip();
-        self.top = build(&boxes);
-        for index in &mut self.top.order {
-            *index = indices[*index as usize];
+        let boxes_of = |movers: bool| {
+            (0_u32..)
+                .zip(self.instances.iter().zip(&self.movers))
+                .filter(|(_, (_, moves))| **moves == movers)
+                .filter_map(|(i, (placed, _))| placed.as_ref().map(|p| (i, p.bounds_world)))
+                .filter(|(_, bounds)| !bounds.is_empty())
+                .unzip()
+        };
+        let (still, moving) = (boxes_of(false), boxes_of(true));
+        self.still.update(still);
+        self.moving.update(moving);
+    }
+
+    /// Says which instances count as movers (parallel to the scene's instances; what is missing is still). None do
+    /// after [`Tracer::new`]. It survives [`Tracer::update`], and changes no answer but those of
+    /// [`Tracer::occlusion_by`].
+    pub fn set_movers(&mut self, movers: &[bool]) {
+        let given = movers.iter().copied().chain(std::iter::repeat(false));
+        self.movers = given.take(self.instances.len()).collect();
+        self.build_top();
+    }
+
+    /// Which instances count as movers, parallel to the scene's instances.
+    pub fn movers(&self) -> &[bool] {
+        &self.movers
+    }
+
+    /// As [`Tracer::occlusion`], asking only `blockers`, and only about directions whose bit is set in `open`: those
+    /// of them that are blocked.
+    pub fn occlusion_by(
+        &self,
+        blockers: Blockers,
+        origin_world: Vec3,
+        directions_world: &[Vec3],
+        t_max: f32,
+        open: &BlockedMask,
+    ) -> BlockedMask {
+        let through = |top: &Top, open: &BlockedMask| {
+            self.blocked_through(&top.tree, origin_world, directions_world, t_max, open)
+        };
+        match blockers {
+            Blockers::Still => through(&self.still, open),
+            Blockers::Movers => through(&self.moving, open),
+            Blockers::All => {
+                let mut blocked = through(&self.still, open);
+                let mut rest = *open;
+                rest.iter_mut().zip(&blocked).for_each(|(rest, blocked)| *rest &= !blocked);
+                let by_movers = through(&self.moving, &rest);
+                blocked.iter_mut().zip(by_movers).for_each(|(all, more)| *all |= more);
+                blocked
+            }
         }
     }
 
     /// Which of `directions_world` (unit length, the first [`MAX_DIRECTIONS`]) are blocked within `t_max` metres of
     /// `origin_world`, as [`Tracer::occluded`] would answer one by one.
     pub fn occlusion(&self, origin_world: Vec3, directions_world: &[Vec3], t_max: f32) -> BlockedMask {
+        let all = [u64::MAX; MAX_DIRECTIONS / PACKET];
+        self.occlusion_by(Blockers::All, origin_world, directions_world, t_max, &all)
+    }
+
+    fn blocked_through(
+        &self,
+        top: &Tree,
+        origin_world: Vec3,
+        directions_world: &[Vec3],
+        t_max: f32,
+        open: &BlockedMask,
+    ) -> BlockedMask {
         let directions_world = &directions_world[..directions_world.len().min(MAX_DIRECTIONS)];
         let mut blocked = BlockedMask::default();
-        if !origin_world.is_finite() || t_max.is_nan() || t_max <= 0.0 {
+        if top.nodes.is_empty() || !origin_world.is_finite() || t_max.is_nan() || t_max <= 0.0 {
             return blocked;
         }
-        let near = self.few_instances_near(origin_world, directions_world, t_max);
+        let near = self.few_instances_near(top, origin_world, directions_world, t_max);
         if near.as_ref().is_some_and(Vec::is_empty) {
             return blocked;
         }
         let mut packets = (Packet::new(), Packet::new());
-        for (word, directions) in blocked.iter_mut().zip(directions_world.chunks(PACKET)) {
+        let words = blocked.iter_mut().zip(directions_world.chunks(PACKET)).zip(open);
+        for ((word, directions), open) in words {
+            let open = open & (u64::MAX >> (PACKET - directions.len()));
+            if open == 0 {
+                continue;
+            }
             *word = match &near {
-                Some(near) => self.blocked_by_few(origin_world, directions, t_max, near, &mut packets.0),
-                None => self.blocked_by_many(origin_world, directions, t_max, &mut packets),
+                Some(near) => {
+                    self.blocked_by_few(origin_world, directions, t_max, near, open, &mut packets.0)
+                }
+                None => self.blocked_by_many(top, origin_world, directions, t_max, open, &mut packets),
             };
         }
         blocked
     }
 
-    /// Sends all rays through each instance.
+    /// Sends all open rays through each instance.
     fn blocked_by_few(
         &self,
         origin_world: Vec3,
         directions_world: &[Vec3],
         t_max: f32,
         near: &[(f32, &PlacedBvh)],
+        all: u64,
         packet: &mut Packet,
     ) -> u64 {
-        let all = u64::MAX >> (PACKET - directions_world.len());
         let mut blocked = 0;
         let mut directions_mesh = [Vec3::ZERO; PACKET];
         for (_, placed) in near {
@@ -287,16 +388,17 @@ impl Tracer {
     /// Finds out first which rays may touch which instance's box.
     fn blocked_by_many(
         &self,
+        top: &Tree,
         origin_world: Vec3,
         directions_world: &[Vec3],
         t_max: f32,
+        open: u64,
         (world, mesh): &mut (Packet, Packet),
     ) -> u64 {
-        let all = u64::MAX >> (PACKET - directions_world.len());
-        world.fill(origin_world, directions_world, all, t_max);
+        world.fill(origin_world, directions_world, open, t_max);
         let bounds_of = |i: u32| self.instances[i as usize].as_ref().map_or(Aabb::EMPTY, |p| p.bounds_world);
         let mut met: Vec<(f32, &PlacedBvh, u64)> = Vec::new();
-        world.primitives_through(&self.top, bounds_of, |instance, rays| {
+        world.primitives_through(top, bounds_of, |instance, rays| {
             if let Some(placed) = &self.instances[instance as usize] {
                 met.push((placed.bounds_world.distance_squared(origin_world), placed, rays));
             }
@@ -337,6 +439,7 @@ impl Tracer {
     /// Instances whose box the rays may touch, nearest first; `None` if they are more than [`FEW_INSTANCES`].
     fn few_instances_near(
         &self,
+        top: &Tree,
         origin: Vec3,
         directions: &[Vec3],
         t_max: f32,
@@ -346,11 +449,11 @@ impl Tracer {
         let reach_squared = t_max * t_max * 1.000_01;
         let mut near = Vec::with_capacity(FEW_INSTANCES);
         let mut stack = Vec::with_capacity(16);
-        if !self.top.nodes.is_empty() {
+        if !top.nodes.is_empty() {
             stack.push(0);
         }
         while let Some(index) = stack.pop() {
-            let node = &self.top.nodes[index as usize];
+            let node = &top.nodes[index as usize];
             let mut slots = node.touching(min, max);
             while slots != 0 {
                 let slot = slots.trailing_zeros() as usize;
@@ -358,7 +461,7 @@ impl Tracer {
                 match node.child(slot) {
                     Child::Inner(child) => stack.push(child),
                     Child::Leaf(range) => {
-                        let indices = self.top.order[range].iter();
+                        let indices = top.order[range].iter();
                         for placed in indices.filter_map(|&i| self.instances[i as usize].as_ref()) {
                             let distance_squared = placed.bounds_world.distance_squared(origin);
                             if distance_squared > reach_squared {
@@ -410,30 +513,32 @@ impl Tracer {
     /// end.
     fn visit_instances<'a>(&'a self, ray: &Ray, mut visit: impl FnMut(&'a PlacedBvh, u32) -> Option<f32>) {
         let Some(world) = MeshRay::new(ray.origin_world, ray.direction_world, ray.t_max) else { return };
-        if self.top.nodes.is_empty() {
-            return;
-        }
         let planes = NearFar::new(&world);
         let mut t_max = ray.t_max;
-        let mut stack = vec![0];
-        while let Some(index) = stack.pop() {
-            let node = &self.top.nodes[index as usize];
-            let mut slots = planes.hits(node, &world, t_max);
-            while slots != 0 {
-                let slot = slots.trailing_zeros() as usize;
-                slots &= slots - 1;
-                match node.child(slot) {
-                    Child::Inner(child) => stack.push(child),
-                    Child::Leaf(range) => {
-                        for &instance in &self.top.order[range] {
-                            let Some(placed) = &self.instances[instance as usize] else { continue };
-                            match visit(placed, instance) {
-                                Some(t) => t_max = t,
-                                None => return,
+        let mut stack = Vec::new();
+        for top in [&self.still.tree, &self.moving.tree] {
+            if !top.nodes.is_empty() {
+                stack.push(0);
+            }
+            while let Some(index) = stack.pop() {
+                let node = &top.nodes[index as usize];
+                let mut slots = planes.hits(node, &world, t_max);
+                while slots != 0 {
+                    let slot = slots.trailing_zeros() as usize;
+                    slots &= slots - 1;
+                    match node.child(slot) {
+                        Child::Inner(child) => stack.push(child),
+                        Child::Leaf(range) => {
+                            for &instance in &top.order[range] {
+                                let Some(placed) = &self.instances[instance as usize] else { continue };
+                                match visit(placed, instance) {
+                                    Some(t) => t_max = t,
+                                    None => return,
+                                }
                             }
                         }
+                        Child::Empty => {}
                     }
-                    Child::Empty => {}
                 }
             }
         }
