@@ -10,14 +10,29 @@ use rayon::prelude::*;
 use super::tree::{MAX_LEAF, Node, Tree, WIDTH, half_area};
 
 const BINS: usize = 16;
+/// So many primitives are sorted to find the best cut; more are put in bins.
+const FEW: usize = 8;
 /// Below this many primitives a range is built by one thread.
 const PARALLEL: usize = 4096;
 /// Below this many primitives bins are filled by one thread.
 const PARALLEL_BINS: usize = 65536;
 /// Deeper than this, ranges are halved by count: bounds the depth for spiteful input.
 const HEURISTIC_DEPTH: u32 = 40;
-/// Cost of a node in units of a triangle test.
-const NODE_COST: f64 = 1.0;
+
+/// What leaves cost and how large they get.
+pub(crate) struct Leaves {
+    /// Most primitives in one, 1 … [`MAX_LEAF`].
+    pub(crate) max: usize,
+    /// Cost of a leaf in units of a node's child.
+    pub(crate) fixed: f64,
+    /// Cost of each primitive in it.
+    pub(crate) each: f64,
+}
+
+/// Leaves of triangles: a block costs about the same however full it is.
+pub(crate) const MESH_LEAVES: Leaves = Leaves { max: MAX_LEAF, fixed: 1.0, each: 0.4 };
+/// Leaves of instances: each is looked at by itself.
+pub(crate) const TOP_LEAVES: Leaves = Leaves { max: 1, fixed: 1.0, each: 1.0 };
 
 #[derive(Clone, Copy)]
 struct Primitive {
@@ -32,12 +47,13 @@ impl Primitive {
     }
 }
 
-/// `count > 0`: a leaf over the primitives from `first`; otherwise children at `first` and `second`.
+/// Over `count` primitives from `start`; if they are more than one, with children at `first` and `second`.
 #[derive(Clone, Copy)]
 struct BinaryNode {
     bounds: Aabb,
     first: u32,
     second: u32,
+    start: u32,
     count: u32,
 }
 
@@ -51,7 +67,7 @@ type Bins = [[Bin; BINS]; 3];
 const NO_BINS: Bins = [[Bin { bounds: Aabb::EMPTY, count: 0 }; BINS]; 3];
 
 /// A tree over `boxes`; empty boxes (min > max) are kept, but never hit. All finite coordinates are welcome.
-pub(crate) fn build(boxes: &[Aabb]) -> Tree {
+pub(crate) fn build(boxes: &[Aabb], leaves: &Leaves) -> Tree {
     if boxes.is_empty() {
         return Tree::default();
     }
@@ -60,17 +76,15 @@ pub(crate) fn build(boxes: &[Aabb]) -> Tree {
         .enumerate()
         .map(|(i, b)| Primitive { min: b.min, max: b.max, index: i as u32 })
         .collect();
-    let unused = BinaryNode { bounds: Aabb::EMPTY, first: 0, second: 0, count: 0 };
+    let unused = BinaryNode { bounds: Aabb::EMPTY, first: 0, second: 0, start: 0, count: 0 };
     let mut binary = vec![unused; 2 * boxes.len() - 1];
     split(&mut primitives, &mut binary, 0, 0, 0);
-
-    let mut nodes = Vec::with_capacity(boxes.len() / 4 + 1);
-    collapse(&binary, 0, &mut nodes);
+    let nodes = collapse(&binary, leaves);
     Tree { nodes, order: primitives.iter().map(|p| p.index).collect() }
 }
 
 /// Builds the subtree of `primitives` (which start at `first` of all) into `nodes` (which start at `base` of all and
-/// are exactly `2 n − 1`).
+/// are exactly `2 n − 1`), down to single primitives.
 fn split(primitives: &mut [Primitive], nodes: &mut [BinaryNode], first: usize, base: usize, depth: u32) {
     let n = primitives.len();
     let (mut bounds, mut centers) = (Aabb::EMPTY, Aabb::EMPTY);
@@ -78,25 +92,26 @@ fn split(primitives: &mut [Primitive], nodes: &mut [BinaryNode], first: usize, b
         bounds = bounds.union(Aabb { min: p.min, max: p.max });
         centers = centers.with_point(p.center());
     }
-    let cut = if n == 1 {
-        None
-    } else if depth >= HEURISTIC_DEPTH {
-        (n > MAX_LEAF).then(|| halve(primitives, &centers))
-    } else {
-        match best_cut(primitives, &bounds, &centers) {
-            Some(cut) if n > MAX_LEAF || cut.cost < n as f64 => Some(partition(primitives, &cut)),
-            _ => (n > MAX_LEAF).then(|| halve(primitives, &centers)),
-        }
-    };
-    let Some(cut) = cut else {
-        nodes[0] = BinaryNode { bounds, first: first as u32, second: 0, count: n as u32 };
+    let (start, count) = (first as u32, n as u32);
+    if n == 1 {
+        nodes[0] = BinaryNode { bounds, first: 0, second: 0, start, count };
         return;
+    }
+    let cut = if depth >= HEURISTIC_DEPTH {
+        halve(primitives, &centers)
+    } else if n <= FEW {
+        sweep(primitives)
+    } else {
+        match best_cut(primitives, &centers) {
+            Some(cut) => partition(primitives, &cut),
+            None => halve(primitives, &centers),
+        }
     };
     let (left, right) = primitives.split_at_mut(cut);
     let (root, below) = nodes.split_at_mut(1);
     let (left_nodes, right_nodes) = below.split_at_mut(2 * cut - 1);
     let (left_base, right_base) = (base + 1, base + 2 * cut);
-    root[0] = BinaryNode { bounds, first: left_base as u32, second: right_base as u32, count: 0 };
+    root[0] = BinaryNode { bounds, first: left_base as u32, second: right_base as u32, start, count };
     if n >= PARALLEL {
         rayon::join(
             || split(left, left_nodes, first, left_base, depth + 1),
@@ -108,13 +123,45 @@ fn split(primitives: &mut [Primitive], nodes: &mut [BinaryNode], first: usize, b
     }
 }
 
+/// Sorts a few primitives along the axis of the best cut and returns where to cut.
+fn sweep(primitives: &mut [Primitive]) -> usize {
+    let n = primitives.len();
+    let mut best = (f64::INFINITY, 0, n / 2);
+    for axis in 0..3 {
+        sort_along(primitives, axis);
+        let mut right_cost = [0.0; FEW + 1];
+        let mut b = Aabb::EMPTY;
+        for i in (1..n).rev() {
+            b = b.union(Aabb { min: primitives[i].min, max: primitives[i].max });
+            right_cost[i] = half_area(&b) * (n - i) as f64;
+        }
+        let mut b = Aabb::EMPTY;
+        for i in 1..n {
+            b = b.union(Aabb { min: primitives[i - 1].min, max: primitives[i - 1].max });
+            let cost = half_area(&b) * i as f64 + right_cost[i];
+            if cost < best.0 {
+                best = (cost, axis, i);
+            }
+        }
+    }
+    if best.1 != 2 {
+        sort_along(primitives, best.1);
+    }
+    best.2
+}
+
+/// By centre, then index: an order that does not depend on the order before.
+fn sort_along(primitives: &mut [Primitive], axis: usize) {
+    primitives
+        .sort_unstable_by(|a, b| a.center()[axis].total_cmp(&b.center()[axis]).then(a.index.cmp(&b.index)));
+}
+
 /// Where to cut: primitives whose bin along `axis` is below `bin` go left.
 struct Cut {
     axis: usize,
     bin: usize,
     origin: f32,
     scale: f32,
-    /// Expected cost of a ray that enters the box, in triangle tests.
     cost: f64,
 }
 
@@ -123,7 +170,7 @@ fn bin_of(center: f32, origin: f32, scale: f32) -> usize {
     (((center - origin) * scale) as usize).min(BINS - 1)
 }
 
-fn best_cut(primitives: &[Primitive], bounds: &Aabb, centers: &Aabb) -> Option<Cut> {
+fn best_cut(primitives: &[Primitive], centers: &Aabb) -> Option<Cut> {
     let extent = centers.max - centers.min;
     let scale = extent.map(|e| if e > 0.0 && e < f32::MAX { BINS as f32 * 0.999_99 / e } else { 0.0 });
     let scale = scale.map(|s| if s.is_finite() { s } else { 0.0 });
@@ -145,7 +192,6 @@ fn best_cut(primitives: &[Primitive], bounds: &Aabb, centers: &Aabb) -> Option<C
         fill(primitives)
     };
 
-    let area = half_area(bounds);
     let mut best: Option<Cut> = None;
     for axis in (0..3).filter(|&a| scale[a] > 0.0) {
         // Costs of everything right of each boundary, then a sweep from the left.
@@ -163,8 +209,7 @@ fn best_cut(primitives: &[Primitive], bounds: &Aabb, centers: &Aabb) -> Option<C
             if n == 0 || right == f64::INFINITY {
                 continue;
             }
-            let both = half_area(&b) * f64::from(n) + right;
-            let cost = NODE_COST + if area > 0.0 { both / area } else { 0.0 };
+            let cost = half_area(&b) * f64::from(n) + right;
             if best.as_ref().is_none_or(|c| cost < c.cost) {
                 best = Some(Cut { axis, bin: i, origin: centers.min[axis], scale: scale[axis], cost });
             }
@@ -204,38 +249,106 @@ fn halve(primitives: &mut [Primitive], centers: &Aabb) -> usize {
     middle
 }
 
-/// Appends the 8-wide form of the binary subtree and returns its index.
-fn collapse(binary: &[BinaryNode], root: usize, nodes: &mut Vec<Node>) -> u32 {
-    let mut slots = [0; WIDTH];
-    let mut used = 1;
-    slots[0] = root;
-    while used < WIDTH {
-        // Open the child that a ray meets most often; the first of equals.
-        let mut widest: Option<(f64, usize)> = None;
-        for (i, &slot) in slots[..used].iter().enumerate().filter(|(_, slot)| binary[**slot].count == 0) {
-            let area = half_area(&binary[slot].bounds);
-            if widest.is_none_or(|(a, _)| area > a) {
-                widest = Some((area, i));
-            }
-        }
-        let Some((_, i)) = widest else { break };
-        let opened = &binary[slots[i]];
-        slots[i] = opened.first as usize;
-        slots[used] = opened.second as usize;
-        used += 1;
-    }
-    let index = nodes.len();
-    let mut node = Node::empty();
-    nodes.push(Node::empty());
-    for (i, &slot) in slots[..used].iter().enumerate() {
-        let child = &binary[slot];
-        node.set_bounds(i, &child.bounds);
-        if child.count > 0 {
-            node.set_leaf(i, child.first, child.count as usize);
+/// The least expected cost of a binary subtree in 8-wide form (\[Ylitie2017\] sec. 3.1): as 1 … 7 children of one node.
+#[derive(Clone, Copy)]
+struct Cost {
+    /// `forest[i]`: as at most `i + 1` children.
+    forest: [f64; WIDTH - 1],
+    /// As a leaf it costs no more than as a node.
+    leaf: bool,
+}
+
+/// The 8-wide form of a binary tree: which subtrees become leaves, and which nodes are opened, by least expected cost.
+///
+/// \[Ylitie2017\]: H. Ylitie, T. Karras, S. Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide
+/// BVHs", HPG 2017.
+fn collapse(binary: &[BinaryNode], leaves: &Leaves) -> Vec<Node> {
+    let mut costs = vec![Cost { forest: [0.0; WIDTH - 1], leaf: true }; binary.len()];
+    // Children lie behind their parents.
+    for index in (0..binary.len()).rev() {
+        let node = &binary[index];
+        let (area, n) = (half_area(&node.bounds), node.count as usize);
+        let as_leaf = if n <= leaves.max {
+            area * (leaves.fixed + leaves.each * n as f64)
         } else {
-            node.set_inner(i, collapse(binary, slot, nodes));
+            f64::INFINITY
+        };
+        if n == 1 {
+            costs[index].forest = [as_leaf; WIDTH - 1];
+            continue;
+        }
+        let (a, b) = (costs[node.first as usize].forest, costs[node.second as usize].forest);
+        let shared = |children: usize| {
+            (0..children - 1).map(|i| a[i.min(WIDTH - 2)] + b[children - 2 - i]).fold(f64::INFINITY, f64::min)
+        };
+        let as_node = area + shared(WIDTH);
+        let mut cost = Cost { forest: [as_leaf.min(as_node); WIDTH - 1], leaf: as_leaf <= as_node };
+        for children in 2..WIDTH {
+            cost.forest[children - 1] = cost.forest[children - 2].min(shared(children));
+        }
+        costs[index] = cost;
+    }
+    let mut nodes = Vec::with_capacity(binary.len() / 16 + 1);
+    if costs[0].leaf {
+        let mut node = Node::empty();
+        node.set_bounds(0, &binary[0].bounds);
+        node.set_leaf(0, 0, binary[0].count as usize);
+        nodes.push(node);
+    } else {
+        open(binary, &costs, 0, &mut nodes);
+    }
+    nodes.shrink_to_fit();
+    nodes
+}
+
+/// Appends the binary subtree as a node and what is below it; returns the node's index.
+fn open(binary: &[BinaryNode], costs: &[Cost], root: usize, nodes: &mut Vec<Node>) -> u32 {
+    let mut slots = [0; WIDTH];
+    let mut used = 0;
+    let top = &binary[root];
+    share(binary, costs, [top.first as usize, top.second as usize], WIDTH, &mut |child| {
+        slots[used] = child;
+        used += 1;
+    });
+    let index = nodes.len();
+    nodes.push(Node::empty());
+    let mut node = Node::empty();
+    for (slot, &child) in slots[..used].iter().enumerate() {
+        let below = &binary[child];
+        node.set_bounds(slot, &below.bounds);
+        if costs[child].leaf {
+            node.set_leaf(slot, below.start, below.count as usize);
+        } else {
+            node.set_inner(slot, open(binary, costs, child, nodes));
         }
     }
     nodes[index] = node;
     index as u32
+}
+
+/// Calls `keep` with the at most `slots` subtrees that two subtrees are best kept as.
+fn share(
+    binary: &[BinaryNode],
+    costs: &[Cost],
+    [left, right]: [usize; 2],
+    slots: usize,
+    keep: &mut impl FnMut(usize),
+) {
+    let (a, b) = (&costs[left].forest, &costs[right].forest);
+    let both = |i: usize| a[i.min(WIDTH - 2)] + b[slots - 2 - i];
+    let best = (0..slots - 1).fold(0, |best, i| if both(i) < both(best) { i } else { best });
+    for (child, slots) in [(left, best + 1), (right, slots - 1 - best)] {
+        // Fewer slots are as good wherever opening it further saves nothing.
+        let forest = &costs[child].forest;
+        let mut wanted = slots.min(WIDTH - 1);
+        while wanted > 1 && forest[wanted - 2] <= forest[wanted - 1] {
+            wanted -= 1;
+        }
+        if wanted == 1 {
+            keep(child);
+        } else {
+            let node = &binary[child];
+            share(binary, costs, [node.first as usize, node.second as usize], wanted, keep);
+        }
+    }
 }

@@ -13,9 +13,16 @@
 
 mod alpha;
 mod build;
+mod bundle;
+mod filter;
+mod leaf;
 mod mesh;
-mod packet;
+mod placement;
+mod query;
+mod single;
+mod stack;
 mod tracer;
+mod traverse;
 mod tree;
 mod triangle;
 

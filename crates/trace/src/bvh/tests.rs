@@ -67,7 +67,7 @@ fn single_triangles_are_exact_at_their_edges() {
         let ray = MeshRay::new(origin, on_edge - origin, f32::INFINITY).unwrap();
         let hit = [[a, b, c], [b, a, d]].map(|t| {
             let corners = t.map(|p| p.to_array());
-            intersect(&ray, &Triangle { corners, id: 0, alpha: super::alpha::OPAQUE }).is_some()
+            intersect(&ray, &Triangle { corners }).is_some()
         });
         assert!(hit[0] || hit[1]);
     }

@@ -5,8 +5,8 @@ use dapple_scene::glam::Vec3;
 
 /// Children of a node.
 pub(crate) const WIDTH: usize = 8;
-/// Most primitives in a leaf.
-pub(crate) const MAX_LEAF: usize = 4;
+/// Most primitives in a leaf: one block of vectors.
+pub(crate) const MAX_LEAF: usize = 8;
 
 /// Boxes grow by this factor of the distance along the ray, which covers the rounding of the box test and of the
 /// triangle test (\[Ize2013\] derives 1 + 2 gamma(3) for the former).
@@ -83,23 +83,6 @@ impl Node {
     pub(crate) fn union(&self) -> Aabb {
         (0..WIDTH).fold(Aabb::EMPTY, |b, slot| b.union(self.child_bounds(slot)))
     }
-
-    /// The children (bit i for slot i) that share a point with the box `min` … `max`.
-    #[inline(always)]
-    pub(crate) fn touching(&self, min: Vec3, max: Vec3) -> u32 {
-        let [x0, y0, z0, x1, y1, z1] = &self.bounds;
-        let mut mask = 0;
-        for i in 0..WIDTH {
-            let apart = (x0[i] > max.x)
-                | (y0[i] > max.y)
-                | (z0[i] > max.z)
-                | (x1[i] < min.x)
-                | (y1[i] < min.y)
-                | (z1[i] < min.z);
-            mask |= u32::from(!apart) << i;
-        }
-        mask
-    }
 }
 
 /// A tree over boxes. Nodes lie parents first; leaves name ranges of `order`.
@@ -118,7 +101,7 @@ impl Tree {
     }
 
     /// Computes all boxes again from the boxes of leaf ranges, without changing who is whose child.
-    pub(crate) fn refit(&mut self, leaf_bounds: impl Fn(std::ops::Range<usize>) -> Aabb) {
+    pub(crate) fn refit(&mut self, mut leaf_bounds: impl FnMut(std::ops::Range<usize>) -> Aabb) {
         for index in (0..self.nodes.len()).rev() {
             for slot in 0..WIDTH {
                 let b = match self.nodes[index].child(slot) {
@@ -129,6 +112,22 @@ impl Tree {
                 self.nodes[index].set_bounds(slot, &b);
             }
         }
+    }
+
+    /// Calls `visit` with the range of each leaf.
+    pub(crate) fn for_each_leaf(&self, mut visit: impl FnMut(std::ops::Range<usize>)) {
+        for node in &self.nodes {
+            for slot in 0..WIDTH {
+                if let Child::Leaf(range) = node.child(slot) {
+                    visit(range);
+                }
+            }
+        }
+    }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        self.nodes.capacity() * size_of::<Node>() + self.order.capacity() * size_of::<u32>()
     }
 
     /// Expected cost of a long random ray, in box and triangle tests (surface area heuristic). Finite, ≥ 0.

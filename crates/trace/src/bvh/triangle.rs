@@ -1,4 +1,4 @@
-//! The watertight ray–triangle test of \[Woop2013\], for one ray and for lanes of rays that share an origin.
+//! The watertight ray–triangle test of \[Woop2013\], which decides every answer.
 //!
 //! A ray is sheared so that it runs along one axis from the origin; a triangle is hit where its three 2D edge
 //! functions agree in sign. Products of `f32` round monotonically, so a computed sign is never wrong, at worst
@@ -6,15 +6,11 @@
 
 use dapple_scene::glam::Vec3;
 
-/// A triangle in leaf order.
+/// A triangle.
 #[derive(Clone, Copy)]
 pub(crate) struct Triangle {
     /// Corners; NaN for a triangle that is not there (bad index, number not finite).
     pub(crate) corners: [[f32; 3]; 3],
-    /// Index into the mesh's triangles.
-    pub(crate) id: u32,
-    /// Index into the mesh's alpha-tested triangles, or [`super::alpha::OPAQUE`].
-    pub(crate) alpha: u32,
 }
 
 /// A ray prepared for box and triangle tests in one mesh's space. The direction need not be of unit length.

@@ -1,0 +1,236 @@
+//! Eight triangles against rays from one origin: sure hits, sure misses, and what only the exact test can tell.
+//!
+//! For an origin o and corners a, b, c relative to it, a direction d meets the triangle in front of o exactly if d lies
+//! on the inner side of the three planes through o and an edge: with n₀ = b × c, n₁ = c × a, n₂ = a × b, all turned by
+//! the sign of the volume a · (b × c), if d · nᵢ ≥ 0 for all i. With N = (b − a) × (c − a), turned too, it is met
+//! within t_max if t_max (N · d) ≥ N · a. All of that but d is the same for all rays of the origin, so a ray costs four
+//! dot products.
+//!
+//! In `f32` each of these numbers is off by at most a bound that is known for the triangle. A number beyond its bound
+//! decides; otherwise [`super::triangle::intersect`] does. The bounds count the rounding of that test too, so that every
+//! answer is that test's answer, whatever the width of the vectors and whether products and sums are fused.
+
+use std::ops::Range;
+
+use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x8, mask32x8};
+
+use super::leaf::{LANES, Rows};
+
+/// Bound of the error of d · nᵢ over (largest coordinate × longest edge × largest direction): 84 roundings for the
+/// longest coordinate of any edge, which is at most twice that of the two edges that are looked at.
+const EDGE_ERROR: f32 = 1.0 / (1 << 16) as f32;
+/// Bound of the error of t_max (N · d) − N · a over (edge² × (t_max × direction + coordinate)): 80 roundings.
+const REACH_ERROR: f32 = 1.0 / (1 << 17) as f32;
+/// Bound of the error of N · a over (edge² × coordinate): 48 roundings.
+const VOLUME_ERROR: f32 = 1.0 / (1 << 18) as f32;
+/// The same in `f64`.
+const VOLUME_ERROR_F64: f64 = 1.0 / (1_u64 << 45) as f64;
+/// More than what is lost where products are below the smallest normal number.
+const UNDERFLOW: f32 = 1e-37;
+
+/// What all rays of an origin share about eight triangles.
+pub(crate) struct Block<S: Simd> {
+    /// The planes through the origin and the edges, turned inwards.
+    planes: [[f32x8<S>; 3]; 3],
+    /// The triangles' normals, turned away from the origin, times t_max.
+    normal: [f32x8<S>; 3],
+    /// |N · a|.
+    volume: f32x8<S>,
+    edge_error: f32x8<S>,
+    reach_error: f32x8<S>,
+    /// Lanes that hold a triangle.
+    lanes: u32,
+}
+
+#[inline(always)]
+fn cross<S: Simd>(a: &[f32x8<S>; 3], b: &[f32x8<S>; 3]) -> [f32x8<S>; 3] {
+    [
+        a[1].mul_sub(b[2], a[2] * b[1]),
+        a[2].mul_sub(b[0], a[0] * b[2]),
+        a[0].mul_sub(b[1], a[1] * b[0]),
+    ]
+}
+
+#[inline(always)]
+fn dot<S: Simd>(a: &[f32x8<S>; 3], b: &[f32x8<S>; 3]) -> f32x8<S> {
+    a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]))
+}
+
+#[inline(always)]
+fn sub<S: Simd>(a: &[f32x8<S>; 3], b: &[f32x8<S>; 3]) -> [f32x8<S>; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+fn largest<S: Simd>(a: &[f32x8<S>; 3]) -> f32x8<S> {
+    a[0].abs().max(a[1].abs()).max(a[2].abs())
+}
+
+impl<S: Simd> Block<S> {
+    /// Looks at `count` triangles from `origin`, for rays of `t_max` lengths of directions with coordinates up to
+    /// `direction_max`.
+    #[inline(always)]
+    pub(crate) fn new(
+        simd: S,
+        rows: &Rows<S>,
+        count: usize,
+        origin: &[f32; 3],
+        t_max: f32,
+        direction_max: f32,
+    ) -> Block<S> {
+        let [ax, ay, az, bx, by, bz, cx, cy, cz] = *rows;
+        let o = origin.map(|x| f32x8::splat(simd, x));
+        let (a, b, c) = ([ax, ay, az], [bx, by, bz], [cx, cy, cz]);
+        // Edges from the corners as they are: relative to the origin these have lost digits.
+        let (ab, bc, ca) = (sub(&b, &a), sub(&c, &b), sub(&a, &c));
+        let (a, b, c) = (sub(&a, &o), sub(&b, &o), sub(&c, &o));
+        let normal = cross(&ca, &ab);
+        let volume = dot(&normal, &a);
+
+        let edge = largest(&ab).max(largest(&ca));
+        let coordinate = largest(&a) + edge;
+        let (edge2, both) = (edge * edge, coordinate * edge);
+        let lanes = (1_u32 << count) - 1;
+        let volume_error = (edge2 * coordinate).mul_add(VOLUME_ERROR, (coordinate + 1.0) * UNDERFLOW);
+        let mut edge_error = (both * direction_max).mul_add(EDGE_ERROR, UNDERFLOW * (1.0 + direction_max));
+        let reach = coordinate + t_max * direction_max;
+        let reach_error = (edge2 * reach).mul_add(REACH_ERROR, UNDERFLOW * (1.0 + direction_max * (1.0 + t_max)));
+        let mut sign = volume;
+        let unsure = !volume.abs().simd_gt(volume_error).to_bitmask() as u32 & lanes;
+        if unsure != 0 {
+            (sign, edge_error) = resolve(simd, rows, origin, unsure, sign, edge_error);
+        }
+
+        let one = f32x8::splat(simd, 1.0).copysign(sign);
+        let turned = |v: [f32x8<S>; 3]| v.map(|x| x * one);
+        let planes = [turned(cross(&b, &bc)), turned(cross(&c, &ca)), turned(cross(&a, &ab))];
+        let turn = one * t_max;
+        Block { planes, normal: normal.map(|x| x * turn), volume: volume * one, edge_error, reach_error, lanes }
+    }
+
+    /// Which lanes may be met by the ray along `d`, and which of those are met for sure.
+    #[inline(always)]
+    pub(crate) fn test(&self, simd: S, d: [f32; 3]) -> (u32, u32) {
+        let d = d.map(|x| f32x8::splat(simd, x));
+        let [p, q, r] = &self.planes;
+        let inside = dot(p, &d).min(dot(q, &d)).min(dot(r, &d));
+        let reach = dot(&self.normal, &d) - self.volume;
+        let (maybe, _) = self.possible(inside, reach);
+        let maybe = maybe & self.lanes;
+        if maybe == 0 {
+            return (0, 0);
+        }
+        let sure = (inside.simd_gt(self.edge_error) & reach.simd_gt(self.reach_error)).to_bitmask() as u32;
+        (maybe, maybe & sure)
+    }
+
+    /// Not beyond an error on the wrong side; true also where a number is none.
+    #[inline(always)]
+    fn possible(&self, inside: f32x8<S>, reach: f32x8<S>) -> (u32, mask32x8<S>) {
+        let out = inside.simd_lt(-self.edge_error) | reach.simd_lt(-self.reach_error);
+        (!(out.to_bitmask() as u32), out)
+    }
+
+    /// The planes of all lanes, for [`Lane`].
+    #[inline(always)]
+    pub(crate) fn spread(&self) -> Spread {
+        let row = |x: &f32x8<S>| <[f32; LANES]>::from(*x);
+        let [p, q, r] = &self.planes;
+        Spread {
+            rows: [
+                row(&p[0]),
+                row(&p[1]),
+                row(&p[2]),
+                row(&q[0]),
+                row(&q[1]),
+                row(&q[2]),
+                row(&r[0]),
+                row(&r[1]),
+                row(&r[2]),
+                row(&self.normal[0]),
+                row(&self.normal[1]),
+                row(&self.normal[2]),
+                row(&self.volume),
+                row(&self.edge_error),
+                row(&self.reach_error),
+            ],
+        }
+    }
+}
+
+/// A block in memory, to take single lanes from.
+pub(crate) struct Spread {
+    rows: [[f32; LANES]; 15],
+}
+
+/// One triangle of a block, against eight rays at a time.
+pub(crate) struct Lane<S: Simd> {
+    rows: [f32x8<S>; 15],
+}
+
+impl Spread {
+    #[inline(always)]
+    pub(crate) fn lane<S: Simd>(&self, simd: S, lane: usize) -> Lane<S> {
+        Lane { rows: std::array::from_fn(|row| f32x8::splat(simd, self.rows[row][lane])) }
+    }
+}
+
+impl<S: Simd> Lane<S> {
+    /// Which of eight rays may meet the triangle, and which of those do for sure.
+    #[inline(always)]
+    pub(crate) fn test(&self, d: &[f32x8<S>; 3]) -> (u32, u32) {
+        let [p0, p1, p2, q0, q1, q2, r0, r1, r2, n0, n1, n2, volume, edge_error, reach_error] = self.rows;
+        let inside = dot(&[p0, p1, p2], d).min(dot(&[q0, q1, q2], d)).min(dot(&[r0, r1, r2], d));
+        let reach = dot(&[n0, n1, n2], d) - volume;
+        let out = inside.simd_lt(-edge_error) | reach.simd_lt(-reach_error);
+        let maybe = !(out.to_bitmask() as u32) & 0xff;
+        if maybe == 0 {
+            return (0, 0);
+        }
+        let sure = (inside.simd_gt(edge_error) & reach.simd_gt(reach_error)).to_bitmask() as u32;
+        (maybe, maybe & sure)
+    }
+}
+
+/// On which side of the lanes in `unsure` the origin lies, in `f64`; where even that cannot tell, an error without
+/// bound hands all rays to the exact test.
+#[cold]
+#[inline(never)]
+fn resolve<S: Simd>(
+    simd: S,
+    rows: &Rows<S>,
+    origin: &[f32; 3],
+    mut unsure: u32,
+    sign: f32x8<S>,
+    edge_error: f32x8<S>,
+) -> (f32x8<S>, f32x8<S>) {
+    let rows = rows.map(<[f32; LANES]>::from);
+    let (mut sign, mut edge_error) = (<[f32; LANES]>::from(sign), <[f32; LANES]>::from(edge_error));
+    while unsure != 0 {
+        let lane = unsure.trailing_zeros() as usize;
+        unsure &= unsure - 1;
+        let corner = |k: usize| [0, 1, 2].map(|axis| f64::from(rows[3 * k + axis][lane]));
+        let (a, b, c) = (corner(0), corner(1), corner(2));
+        let sub = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+        let largest = |v: [f64; 3]| v[0].abs().max(v[1].abs()).max(v[2].abs());
+        let (ab, ac, at) = (sub(b, a), sub(c, a), sub(a, origin.map(f64::from)));
+        let volume = at[0] * (ab[1] * ac[2] - ab[2] * ac[1])
+            + at[1] * (ab[2] * ac[0] - ab[0] * ac[2])
+            + at[2] * (ab[0] * ac[1] - ab[1] * ac[0]);
+        let edge = largest(ab).max(largest(ac));
+        if volume.abs() > VOLUME_ERROR_F64 * edge * edge * (largest(at) + edge) {
+            sign[lane] = volume as f32;
+            if sign[lane] == 0.0 {
+                sign[lane] = 0.0_f32.copysign(if volume < 0.0 { -1.0 } else { 1.0 });
+            }
+        } else {
+            edge_error[lane] = f32::INFINITY;
+        }
+    }
+    (f32x8::load_array(simd, sign), f32x8::load_array(simd, edge_error))
+}
+
+/// Lanes of a leaf.
+pub(crate) fn lanes(range: &Range<usize>) -> u32 {
+    (1 << range.len()) - 1
+}

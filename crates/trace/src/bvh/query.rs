@@ -1,0 +1,208 @@
+//! The queries that the rest of the crate asks.
+
+use std::ops::Range;
+
+use dapple_scene::glam::Vec3;
+use fearless_simd::{Simd, dispatch};
+
+use super::bundle::{BUNDLE, Bundle};
+use super::stack::Stack;
+use super::tracer::{Blockers, PlacedBvh, Top, Tracer};
+use super::traverse::{Blocker, Boxes, trace_bundle, traverse};
+use super::tree::{CONSERVATIVE, Child, WIDTH};
+use super::triangle::{MeshRay, TriangleHit};
+use super::{BlockedMask, Hit, MAX_DIRECTIONS, Ray};
+
+impl Tracer {
+    /// Which of `directions_world` (unit length, the first [`MAX_DIRECTIONS`]) are blocked within `t_max` metres of
+    /// `origin_world`, as [`Tracer::occluded`] would answer one by one.
+    pub fn occlusion(&self, origin_world: Vec3, directions_world: &[Vec3], t_max: f32) -> BlockedMask {
+        let all = [u64::MAX; MAX_DIRECTIONS / BUNDLE];
+        self.occlusion_by(Blockers::All, origin_world, directions_world, t_max, &all)
+    }
+
+    /// As [`Tracer::occlusion`], asking only `blockers`, and only about directions whose bit is set in `open`: those
+    /// of them that are blocked.
+    pub fn occlusion_by(
+        &self,
+        blockers: Blockers,
+        origin_world: Vec3,
+        directions_world: &[Vec3],
+        t_max: f32,
+        open: &BlockedMask,
+    ) -> BlockedMask {
+        let tops = match blockers {
+            Blockers::Still => [Some(&self.still), None],
+            Blockers::Movers => [Some(&self.moving), None],
+            Blockers::All => [Some(&self.still), Some(&self.moving)],
+        };
+        let directions_world = &directions_world[..directions_world.len().min(MAX_DIRECTIONS)];
+        let mut blocked = BlockedMask::default();
+        for ((word, directions), open) in blocked.iter_mut().zip(directions_world.chunks(BUNDLE)).zip(open) {
+            let open = open & (u64::MAX >> (BUNDLE - directions.len()));
+            if open != 0 {
+                *word = dispatch!(self.level, simd => self.blocked(simd, &tops, origin_world, directions, t_max, open));
+            }
+        }
+        blocked
+    }
+
+    /// Those of at most [`BUNDLE`] directions whose bit is set in `open` that something blocks.
+    #[inline(always)]
+    fn blocked<S: Simd>(
+        &self,
+        simd: S,
+        tops: &[Option<&Top>; 2],
+        origin_world: Vec3,
+        directions_world: &[Vec3],
+        t_max: f32,
+        open: u64,
+    ) -> u64 {
+        let mut world = Bundle::new();
+        let source = world.fill(origin_world, directions_world, t_max);
+        let lane_of = |wanted: u64| {
+            let lanes = source[..directions_world.len()].iter().enumerate();
+            lanes.fold(0_u64, |lanes, (lane, &i)| lanes | (wanted >> i & 1) << lane)
+        };
+        world.prepare(simd, lane_of(open));
+        let mut open = world.valid;
+        let mut blocked = 0;
+        let mut mesh = Bundle::new();
+        for top in tops.iter().flatten().filter(|top| !top.tree.nodes.is_empty()) {
+            let (reach, t_far) = world.reach(simd, &top.bounds);
+            let hit = traverse(simd, &world, &reach, t_far, &top.tree, open, true, |range: Range<usize>, rays| {
+                let instance = top.tree.order[range.start];
+                let Some(placed) = &self.instances[instance as usize] else { return 0 };
+                let blocker = Blocker { bvh: &placed.bvh, alpha: &self.alpha };
+                if placed.placement.identity {
+                    return trace_bundle(simd, &world, blocker, rays);
+                }
+                mesh.place(simd, &world, &placed.placement, rays);
+                mesh.prepare(simd, rays);
+                trace_bundle(simd, &mesh, blocker, rays)
+            });
+            open &= !hit;
+            blocked |= hit;
+        }
+        let mut found = 0;
+        while blocked != 0 {
+            found |= 1 << source[blocked.trailing_zeros() as usize];
+            blocked &= blocked - 1;
+        }
+        found
+    }
+
+    /// Whether anything blocks the ray.
+    pub fn occluded(&self, ray: &Ray) -> bool {
+        dispatch!(self.level, simd => {
+            let mut blocked = false;
+            self.visit_instances(simd, ray, |placed, _| {
+                blocked = placed.placement.ray(ray).is_some_and(|r| placed.bvh.any_hit(simd, &r, &self.alpha));
+                if blocked { None } else { Some(ray.t_max) }
+            });
+            blocked
+        })
+    }
+
+    /// The nearest thing that the ray meets; of equally near ones that of the lowest instance, then triangle.
+    pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
+        dispatch!(self.level, simd => {
+            let mut best: Option<Hit> = None;
+            self.visit_instances(simd, ray, |placed, instance| {
+                let t_best = best.map_or(ray.t_max, |b| b.t);
+                let mesh_ray = placed.placement.ray(ray);
+                let found = mesh_ray.and_then(|r| placed.bvh.closest_hit(simd, &r, t_best, &self.alpha));
+                if let Some((triangle, hit)) = found
+                    && best.is_none_or(|b| hit.t < b.t || instance < b.instance)
+                {
+                    best = Some(hit_of(instance, triangle, &hit));
+                }
+                Some(best.map_or(ray.t_max, |b| b.t))
+            });
+            best
+        })
+    }
+
+    /// Everything that the ray meets, by distance, then instance, then triangle. `hits` is cleared first.
+    ///
+    /// As many hits as there are triangles are possible; a ray through a shared edge meets both of its triangles.
+    pub fn all_hits(&self, ray: &Ray, hits: &mut Vec<Hit>) {
+        hits.clear();
+        dispatch!(self.level, simd => {
+            self.visit_instances(simd, ray, |placed, instance| {
+                if let Some(r) = placed.placement.ray(ray) {
+                    placed.bvh.all_hits(simd, &r, &self.alpha, &mut |triangle, hit| {
+                        hits.push(hit_of(instance, triangle, &hit));
+                    });
+                }
+                Some(ray.t_max)
+            })
+        });
+        let order = |a: &Hit, b: &Hit| {
+            a.t.total_cmp(&b.t).then((a.instance, a.triangle).cmp(&(b.instance, b.triangle)))
+        };
+        hits.sort_unstable_by(order);
+    }
+
+    /// Calls `visit` for instances whose box the ray may touch; it returns how far the ray still goes, or `None` to
+    /// end.
+    #[inline(always)]
+    fn visit_instances<'a, S: Simd>(
+        &'a self,
+        simd: S,
+        ray: &Ray,
+        mut visit: impl FnMut(&'a PlacedBvh, u32) -> Option<f32>,
+    ) {
+        let Some(world) = MeshRay::new(ray.origin_world, ray.direction_world, ray.t_max) else { return };
+        let mut t_max = ray.t_max;
+        for top in [&self.still, &self.moving].into_iter().filter(|top| !top.tree.nodes.is_empty()) {
+            // Leaves by their index beyond the nodes'.
+            let nodes = top.tree.nodes.len() as u32;
+            let mut stack: Stack<(f32, u32)> = Stack::new((0.0, 0));
+            while let Some((enter, index)) = stack.pop() {
+                if enter > t_max * CONSERVATIVE {
+                    continue;
+                }
+                if index >= nodes {
+                    let instance = top.tree.order[(index - nodes) as usize];
+                    let Some(placed) = &self.instances[instance as usize] else { continue };
+                    match visit(placed, instance) {
+                        Some(t) => t_max = t,
+                        None => return,
+                    }
+                    continue;
+                }
+                let node = &top.tree.nodes[index as usize];
+                let (mut slots, enter) = Boxes::new(simd, node, &world.origin).through(simd, world.inverse, t_max);
+                let enter = <[f32; WIDTH]>::from(enter);
+                let mut met = [(0.0_f32, 0_u32); WIDTH];
+                let mut count = 0;
+                while slots != 0 {
+                    let slot = slots.trailing_zeros() as usize;
+                    slots &= slots - 1;
+                    let child = match node.child(slot) {
+                        Child::Inner(child) => child,
+                        Child::Leaf(range) => nodes + range.start as u32,
+                        Child::Empty => continue,
+                    };
+                    // Nearest on top.
+                    let mut at = count;
+                    while at > 0 && met[at - 1].0 < enter[slot] {
+                        met[at] = met[at - 1];
+                        at -= 1;
+                    }
+                    met[at] = (enter[slot], child);
+                    count += 1;
+                }
+                for &item in &met[..count] {
+                    stack.push(item);
+                }
+            }
+        }
+    }
+}
+
+fn hit_of(instance: u32, triangle: u32, hit: &TriangleHit) -> Hit {
+    let barycentrics = Vec3::from_array(hit.weights);
+    Hit { t: hit.t, instance, triangle, barycentrics, back_face: hit.back_face }
+}
