@@ -1,0 +1,148 @@
+//! Building, timed, and what it takes in memory.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use anyhow::{Context, Result};
+use dapple_trace::Tracer;
+use obvhs::BvhBuildParams;
+use obvhs::cwbvh::CwBvh;
+use obvhs::cwbvh::builder::build_cwbvh_from_tris;
+use obvhs::triangle::Triangle;
+use parry3d::math::Vector;
+use parry3d::shape::TriMesh;
+
+use crate::clock::{Took, median, time_process};
+use crate::embree::{self, Device, Embree, Geometry, Quality};
+use crate::scenes::Triangles;
+use crate::tracers::{self, Candidate};
+
+/// What building took and gave.
+pub(crate) struct Built {
+    pub(crate) name: &'static str,
+    pub(crate) one_thread: Took,
+    /// `None` where the builder has one thread only.
+    pub(crate) all_threads: Option<Took>,
+    /// What queries need; `None` where nobody counts it.
+    pub(crate) bytes: Option<usize>,
+    /// The most that building held.
+    pub(crate) most_bytes: Option<usize>,
+}
+
+/// All tracers of one mesh.
+pub(crate) struct Tracers {
+    ours: Tracer,
+    embree: Vec<(Quality, embree::Scene)>,
+    obvhs: (CwBvh, Vec<Triangle>),
+    parry: TriMesh,
+}
+
+impl Tracers {
+    pub(crate) fn candidates(&self) -> Vec<Candidate<'_>> {
+        let mut all: Vec<Candidate> = tracers::ours(&self.ours).into();
+        all.extend(self.embree.iter().flat_map(|(quality, scene)| tracers::embree(scene, *quality)));
+        all.push(tracers::obvhs(&self.obvhs.0, &self.obvhs.1));
+        all.push(tracers::parry(&self.parry));
+        all
+    }
+}
+
+/// Builds everything, ours and Embree's `repetitions` times.
+pub(crate) fn build(
+    mesh: &Triangles,
+    embree: Option<&Arc<Embree>>,
+    robust: bool,
+    repetitions: usize,
+) -> Result<(Tracers, Vec<Built>)> {
+    let (ours, built) = build_ours(mesh, repetitions)?;
+    let mut table = vec![built];
+    let mut scenes = Vec::new();
+    if let Some(embree) = embree {
+        let geometry = Geometry::new(&mesh.positions, &mesh.triangles)?;
+        for (quality, name) in [(Quality::Medium, "Embree medium"), (Quality::High, "Embree high")] {
+            const ROBUST: i32 = 1 << 2;
+            let flags = if robust { ROBUST } else { 0 };
+            let run = |threads: usize| {
+                repeat(repetitions, || {
+                    // A device for each, so that its memory is that of one scene; making it is not timed.
+                    let device = Device::new(embree, threads)?;
+                    let (scene, took) =
+                        time_process(|| embree::Scene::new(&device, &geometry, quality, flags));
+                    Ok((scene?, took))
+                })
+            };
+            let all_threads = run(0)?.1;
+            let (scene, one_thread) = run(1)?;
+            let (bytes, most_bytes) = scene.memory();
+            table.push(Built {
+                name,
+                one_thread,
+                all_threads: Some(all_threads),
+                bytes: Some(bytes),
+                most_bytes: Some(most_bytes),
+            });
+            scenes.push((quality, scene));
+        }
+    }
+
+    let only =
+        |name, one_thread, bytes| Built { name, one_thread, all_threads: None, bytes, most_bytes: None };
+    let corners = |t: &[u32; 3]| t.map(|i| mesh.positions[i as usize].into());
+    let triangles = mesh.triangles.iter().map(|t| {
+        let [v0, v1, v2] = corners(t);
+        Triangle { v0, v1, v2 }
+    });
+    let triangles: Vec<Triangle> = triangles.collect();
+    let (tree, took) = time_process(|| {
+        build_cwbvh_from_tris(&triangles, BvhBuildParams::slow_build(), &mut Duration::default())
+    });
+    let bytes = size_of_val(&*tree.nodes)
+        + size_of_val(&*tree.primitive_indices)
+        + triangles.len() * size_of::<Triangle>();
+    table.push(only("obvhs slow", took, Some(bytes)));
+
+    let vertices = mesh.positions.iter().map(|p| Vector::new(p.x, p.y, p.z)).collect();
+    let (parry, took) = time_process(|| TriMesh::new(vertices, mesh.triangles.clone()));
+    table.push(only("parry", took, None));
+    let parry = parry.context("parry refuses the mesh")?;
+    Ok((Tracers { ours, embree: scenes, obvhs: (tree, triangles), parry }, table))
+}
+
+fn build_ours(mesh: &Triangles, repetitions: usize) -> Result<(Tracer, Built)> {
+    let (scene, pose) = mesh.scene();
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+        repeat(repetitions, || Ok(time_process(|| pool.install(|| Tracer::new(&scene, &pose)))))
+    };
+    let all_threads = run(0)?.1;
+    let (tracer, one_thread) = run(1)?;
+    let built = Built {
+        name: "ours",
+        one_thread,
+        all_threads: Some(all_threads),
+        bytes: our_bytes(&tracer),
+        most_bytes: None,
+    };
+    Ok((tracer, built))
+}
+
+// MEMORY OF OUR TRACER: as soon as there is `Tracer::bytes()`, this is `Some(tracer.bytes())`; the table then shows
+// bytes per triangle beside Embree's.
+fn our_bytes(_tracer: &Tracer) -> Option<usize> {
+    None
+}
+
+/// What the last repetition made, and the medians of all.
+fn repeat<T>(repetitions: usize, mut work: impl FnMut() -> Result<(T, Took)>) -> Result<(T, Took)> {
+    let (mut made, took) = work()?;
+    let mut all = vec![took];
+    for _ in 1..repetitions {
+        // The one before goes first: two at a time would take twice the memory.
+        drop(made);
+        let (next, took) = work()?;
+        made = next;
+        all.push(took);
+    }
+    let of = |pick: fn(&Took) -> f64| median(all.iter().map(pick));
+    Ok((made, Took { wall_s: of(|t| t.wall_s), cpu_s: of(|t| t.cpu_s) }))
+}
