@@ -121,7 +121,11 @@ impl Bundle {
     #[inline(always)]
     pub(crate) fn chunk<S: Simd>(&self, simd: S, of: &Coordinates, chunk: usize) -> [f32x8<S>; 3] {
         let range = chunk * LANES..(chunk + 1) * LANES;
-        [0, 1, 2].map(|axis| f32x8::from_slice(simd, &of[axis][range.clone()]))
+        [
+            f32x8::from_slice(simd, &of[0][range.clone()]),
+            f32x8::from_slice(simd, &of[1][range.clone()]),
+            f32x8::from_slice(simd, &of[2][range]),
+        ]
     }
 
     /// Computes what follows from the directions, for the rays in `wanted`.
@@ -141,11 +145,10 @@ impl Bundle {
                 & main.simd_le(f32::MAX)
                 & (1.0 / main).simd_le(f32::MAX);
             valid |= finite.to_bitmask() << (chunk * LANES);
-            let kept = |x: f32x8<S>, otherwise: f32x8<S>| finite.select(x, otherwise);
-            main_min = main_min.min(kept(main, f32x8::splat(simd, f32::MAX)));
-            direction_max = direction_max.max(kept(main, zero));
+            main_min = main_min.min(finite.select(main, f32x8::splat(simd, f32::MAX)));
+            direction_max = direction_max.max(finite.select(main, zero));
             for (axis, sum) in sum.iter_mut().enumerate() {
-                *sum += kept(d[axis], zero);
+                *sum += finite.select(d[axis], zero);
                 let inverse = (1.0 / d[axis]).min(f32::MAX).max(-f32::MAX);
                 inverse.store_slice(&mut self.inverse[axis][chunk * LANES..(chunk + 1) * LANES]);
             }
@@ -153,7 +156,7 @@ impl Bundle {
         self.valid = valid & wanted;
         self.main_min = main_min.reduce_min();
         self.direction_max = direction_max.reduce_max();
-        let axis = Vec3::from_array(sum.map(|x| x.reduce_sum()));
+        let axis = Vec3::new(sum[0].reduce_sum(), sum[1].reduce_sum(), sum[2].reduce_sum());
         self.axis = (axis / axis.length()).to_array();
         let sound = self.origin.iter().all(|x| x.is_finite()) && self.t_max > 0.0;
         if !sound {
@@ -169,7 +172,7 @@ impl Bundle {
         // Whatever is met lies inside the bounds, so its coordinate along a ray's main axis does.
         let t_far = self.t_max.min(8.0 * extent / self.main_min).min(f32::MAX);
         let zero = f32x8::splat(simd, 0.0);
-        let axis = self.axis.map(|x| f32x8::splat(simd, x));
+        let [ax, ay, az] = self.axis;
         let (mut lo, mut hi, mut length2) = ([zero; 3], [zero; 3], zero);
         let mut along = f32x8::splat(simd, f32::MAX);
         for chunk in 0..CHUNKS {
@@ -178,13 +181,14 @@ impl Bundle {
                 continue;
             }
             let wanted = fearless_simd::mask32x8::from_bitmask(simd, wanted);
-            let d = self.chunk(simd, &self.directions, chunk).map(|x| wanted.select(x, zero));
+            let [dx, dy, dz] = self.chunk(simd, &self.directions, chunk);
+            let d = [wanted.select(dx, zero), wanted.select(dy, zero), wanted.select(dz, zero)];
             for k in 0..3 {
                 lo[k] = lo[k].min(d[k]);
                 hi[k] = hi[k].max(d[k]);
             }
             length2 = length2.max(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-            let a = d[0] * axis[0] + d[1] * axis[1] + d[2] * axis[2];
+            let a = d[0] * ax + d[1] * ay + d[2] * az;
             along = along.min(wanted.select(a, f32x8::splat(simd, f32::MAX)));
         }
         // An axis along which no ray runs is reached nowhere, however long the rays (0 times infinity is NaN).
@@ -194,8 +198,8 @@ impl Bundle {
         // Not a number where there is no mean direction: then nothing is behind.
         let floor = if along >= 0.0 { 0.0 } else { along * t_far * CONSERVATIVE };
         let reach = Reach {
-            min: lo.map(|x| scale(x.reduce_min())),
-            max: hi.map(|x| scale(x.reduce_max())),
+            min: [scale(lo[0].reduce_min()), scale(lo[1].reduce_min()), scale(lo[2].reduce_min())],
+            max: [scale(hi[0].reduce_max()), scale(hi[1].reduce_max()), scale(hi[2].reduce_max())],
             radius2,
             axis: self.axis,
             floor,

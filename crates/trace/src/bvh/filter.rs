@@ -10,9 +10,7 @@
 //! decides; otherwise [`super::triangle::intersect`] does. The bounds count the rounding of that test too, so that every
 //! answer is that test's answer, whatever the width of the vectors and whether products and sums are fused.
 
-use std::ops::Range;
-
-use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x8, mask32x8};
+use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x8};
 
 use super::leaf::{LANES, Rows};
 
@@ -62,6 +60,16 @@ fn sub<S: Simd>(a: &[f32x8<S>; 3], b: &[f32x8<S>; 3]) -> [f32x8<S>; 3] {
 }
 
 #[inline(always)]
+fn splat3<S: Simd>(simd: S, a: &[f32; 3]) -> [f32x8<S>; 3] {
+    [f32x8::splat(simd, a[0]), f32x8::splat(simd, a[1]), f32x8::splat(simd, a[2])]
+}
+
+#[inline(always)]
+fn scaled<S: Simd>(a: [f32x8<S>; 3], by: f32x8<S>) -> [f32x8<S>; 3] {
+    [a[0] * by, a[1] * by, a[2] * by]
+}
+
+#[inline(always)]
 fn largest<S: Simd>(a: &[f32x8<S>; 3]) -> f32x8<S> {
     a[0].abs().max(a[1].abs()).max(a[2].abs())
 }
@@ -79,7 +87,7 @@ impl<S: Simd> Block<S> {
         direction_max: f32,
     ) -> Block<S> {
         let [ax, ay, az, bx, by, bz, cx, cy, cz] = *rows;
-        let o = origin.map(|x| f32x8::splat(simd, x));
+        let o = splat3(simd, origin);
         let (a, b, c) = ([ax, ay, az], [bx, by, bz], [cx, cy, cz]);
         // Edges from the corners as they are: relative to the origin these have lost digits.
         let (ab, bc, ca) = (sub(&b, &a), sub(&c, &b), sub(&a, &c));
@@ -102,21 +110,21 @@ impl<S: Simd> Block<S> {
         }
 
         let one = f32x8::splat(simd, 1.0).copysign(sign);
-        let turned = |v: [f32x8<S>; 3]| v.map(|x| x * one);
-        let planes = [turned(cross(&b, &bc)), turned(cross(&c, &ca)), turned(cross(&a, &ab))];
-        let turn = one * t_max;
-        Block { planes, normal: normal.map(|x| x * turn), volume: volume * one, edge_error, reach_error, lanes }
+        let planes = [scaled(cross(&b, &bc), one), scaled(cross(&c, &ca), one), scaled(cross(&a, &ab), one)];
+        let normal = scaled(normal, one * t_max);
+        Block { planes, normal, volume: volume * one, edge_error, reach_error, lanes }
     }
 
     /// Which lanes may be met by the ray along `d`, and which of those are met for sure.
     #[inline(always)]
     pub(crate) fn test(&self, simd: S, d: [f32; 3]) -> (u32, u32) {
-        let d = d.map(|x| f32x8::splat(simd, x));
+        let d = splat3(simd, &d);
         let [p, q, r] = &self.planes;
         let inside = dot(p, &d).min(dot(q, &d)).min(dot(r, &d));
         let reach = dot(&self.normal, &d) - self.volume;
-        let (maybe, _) = self.possible(inside, reach);
-        let maybe = maybe & self.lanes;
+        // Not beyond an error on the wrong side; so too where a number is none.
+        let out = inside.simd_lt(-self.edge_error) | reach.simd_lt(-self.reach_error);
+        let maybe = !(out.to_bitmask() as u32) & self.lanes;
         if maybe == 0 {
             return (0, 0);
         }
@@ -124,37 +132,27 @@ impl<S: Simd> Block<S> {
         (maybe, maybe & sure)
     }
 
-    /// Not beyond an error on the wrong side; true also where a number is none.
-    #[inline(always)]
-    fn possible(&self, inside: f32x8<S>, reach: f32x8<S>) -> (u32, mask32x8<S>) {
-        let out = inside.simd_lt(-self.edge_error) | reach.simd_lt(-self.reach_error);
-        (!(out.to_bitmask() as u32), out)
-    }
-
     /// The planes of all lanes, for [`Lane`].
     #[inline(always)]
     pub(crate) fn spread(&self) -> Spread {
-        let row = |x: &f32x8<S>| <[f32; LANES]>::from(*x);
-        let [p, q, r] = &self.planes;
-        Spread {
-            rows: [
-                row(&p[0]),
-                row(&p[1]),
-                row(&p[2]),
-                row(&q[0]),
-                row(&q[1]),
-                row(&q[2]),
-                row(&r[0]),
-                row(&r[1]),
-                row(&r[2]),
-                row(&self.normal[0]),
-                row(&self.normal[1]),
-                row(&self.normal[2]),
-                row(&self.volume),
-                row(&self.edge_error),
-                row(&self.reach_error),
-            ],
-        }
+        let ([p, q, r], n) = (&self.planes, &self.normal);
+        let mut rows = [[0.0; LANES]; 15];
+        p[0].store_slice(&mut rows[0]);
+        p[1].store_slice(&mut rows[1]);
+        p[2].store_slice(&mut rows[2]);
+        q[0].store_slice(&mut rows[3]);
+        q[1].store_slice(&mut rows[4]);
+        q[2].store_slice(&mut rows[5]);
+        r[0].store_slice(&mut rows[6]);
+        r[1].store_slice(&mut rows[7]);
+        r[2].store_slice(&mut rows[8]);
+        n[0].store_slice(&mut rows[9]);
+        n[1].store_slice(&mut rows[10]);
+        n[2].store_slice(&mut rows[11]);
+        self.volume.store_slice(&mut rows[12]);
+        self.edge_error.store_slice(&mut rows[13]);
+        self.reach_error.store_slice(&mut rows[14]);
+        Spread { rows }
     }
 }
 
@@ -171,7 +169,11 @@ pub(crate) struct Lane<S: Simd> {
 impl Spread {
     #[inline(always)]
     pub(crate) fn lane<S: Simd>(&self, simd: S, lane: usize) -> Lane<S> {
-        Lane { rows: std::array::from_fn(|row| f32x8::splat(simd, self.rows[row][lane])) }
+        let mut rows = [f32x8::splat(simd, 0.0); 15];
+        for (row, numbers) in rows.iter_mut().zip(&self.rows) {
+            *row = f32x8::splat(simd, numbers[lane]);
+        }
+        Lane { rows }
     }
 }
 
@@ -228,9 +230,4 @@ fn resolve<S: Simd>(
         }
     }
     (f32x8::load_array(simd, sign), f32x8::load_array(simd, edge_error))
-}
-
-/// Lanes of a leaf.
-pub(crate) fn lanes(range: &Range<usize>) -> u32 {
-    (1 << range.len()) - 1
 }

@@ -64,6 +64,10 @@ impl Triangles {
     pub(crate) fn load<S: Simd>(&self, simd: S, range: &Range<usize>) -> Rows<S> {
         let n = range.len();
         let block = &self.rows[range.start * ROWS..range.start * ROWS + 8 * n + LANES];
-        std::array::from_fn(|row| f32x8::from_slice(simd, &block[row * n..row * n + LANES]))
+        let mut rows = [f32x8::splat(simd, 0.0); ROWS];
+        for (row, out) in rows.iter_mut().enumerate() {
+            *out = f32x8::from_slice(simd, &block[row * n..row * n + LANES]);
+        }
+        rows
     }
 }

@@ -8,7 +8,7 @@ use fearless_simd::{Simd, dispatch};
 use super::bundle::{BUNDLE, Bundle};
 use super::stack::Stack;
 use super::tracer::{Blockers, PlacedBvh, Top, Tracer};
-use super::traverse::{Blocker, Boxes, trace_bundle, traverse};
+use super::traverse::{Blocker, Boxes, Visitor, trace_bundle, traverse};
 use super::tree::{CONSERVATIVE, Child, WIDTH};
 use super::triangle::{MeshRay, TriangleHit};
 use super::{BlockedMask, Hit, MAX_DIRECTIONS, Ray};
@@ -60,27 +60,16 @@ impl Tracer {
     ) -> u64 {
         let mut world = Bundle::new();
         let source = world.fill(origin_world, directions_world, t_max);
-        let lane_of = |wanted: u64| {
-            let lanes = source[..directions_world.len()].iter().enumerate();
-            lanes.fold(0_u64, |lanes, (lane, &i)| lanes | (wanted >> i & 1) << lane)
-        };
-        world.prepare(simd, lane_of(open));
+        let lanes = source[..directions_world.len()].iter().enumerate();
+        let wanted = lanes.fold(0_u64, |lanes, (lane, &i)| lanes | (open >> i & 1) << lane);
+        world.prepare(simd, wanted);
         let mut open = world.valid;
         let mut blocked = 0;
         let mut mesh = Bundle::new();
         for top in tops.iter().flatten().filter(|top| !top.tree.nodes.is_empty()) {
             let (reach, t_far) = world.reach(simd, &top.bounds);
-            let hit = traverse(simd, &world, &reach, t_far, &top.tree, open, true, |range: Range<usize>, rays| {
-                let instance = top.tree.order[range.start];
-                let Some(placed) = &self.instances[instance as usize] else { return 0 };
-                let blocker = Blocker { bvh: &placed.bvh, alpha: &self.alpha };
-                if placed.placement.identity {
-                    return trace_bundle(simd, &world, blocker, rays);
-                }
-                mesh.place(simd, &world, &placed.placement, rays);
-                mesh.prepare(simd, rays);
-                trace_bundle(simd, &mesh, blocker, rays)
-            });
+            let mut visitor = Instances { tracer: self, top, world: &world, mesh: &mut mesh };
+            let hit = traverse(simd, &world, &reach, t_far, &top.tree, open, &mut visitor);
             open &= !hit;
             blocked |= hit;
         }
@@ -199,6 +188,30 @@ impl Tracer {
                 }
             }
         }
+    }
+}
+
+/// Sends bundles through the instances of an upper tree.
+struct Instances<'a> {
+    tracer: &'a Tracer,
+    top: &'a Top,
+    world: &'a Bundle,
+    mesh: &'a mut Bundle,
+}
+
+impl<S: Simd> Visitor<S> for Instances<'_> {
+    const IN_ORDER: bool = true;
+    #[inline(always)]
+    fn visit(&mut self, simd: S, range: Range<usize>, rays: u64) -> u64 {
+        let instance = self.top.tree.order[range.start];
+        let Some(placed) = &self.tracer.instances[instance as usize] else { return 0 };
+        let mut bundle = self.world;
+        if !placed.placement.identity {
+            self.mesh.place(simd, self.world, &placed.placement, rays);
+            self.mesh.prepare(simd, rays);
+            bundle = self.mesh;
+        }
+        trace_bundle(simd, bundle, Blocker { bvh: &placed.bvh, alpha: &self.tracer.alpha }, rays)
     }
 }
 

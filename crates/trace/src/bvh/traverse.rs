@@ -23,9 +23,16 @@ pub(crate) struct Boxes<S: Simd> {
 impl<S: Simd> Boxes<S> {
     #[inline(always)]
     pub(crate) fn new(simd: S, node: &Node, origin: &[f32; 3]) -> Boxes<S> {
-        let o = origin.map(|x| f32x8::splat(simd, x));
+        let b = &node.bounds;
         Boxes {
-            planes: std::array::from_fn(|row| f32x8::load_array_ref(simd, &node.bounds[row]) - o[row % 3]),
+            planes: [
+                f32x8::load_array_ref(simd, &b[0]) - origin[0],
+                f32x8::load_array_ref(simd, &b[1]) - origin[1],
+                f32x8::load_array_ref(simd, &b[2]) - origin[2],
+                f32x8::load_array_ref(simd, &b[3]) - origin[0],
+                f32x8::load_array_ref(simd, &b[4]) - origin[1],
+                f32x8::load_array_ref(simd, &b[5]) - origin[2],
+            ],
         }
     }
 
@@ -37,8 +44,7 @@ impl<S: Simd> Boxes<S> {
         let apart = x0.simd_gt(hi[0]) | y0.simd_gt(hi[1]) | z0.simd_gt(hi[2]);
         let apart = apart | x1.simd_lt(lo[0]) | y1.simd_lt(lo[1]) | z1.simd_lt(lo[2]);
         let zero = f32x8::splat(simd, 0.0);
-        let outside = |lo: f32x8<S>, hi: f32x8<S>| lo.max(-hi).max(zero);
-        let (x, y, z) = (outside(x0, x1), outside(y0, y1), outside(z0, z1));
+        let (x, y, z) = (x0.max(-x1).max(zero), y0.max(-y1).max(zero), z0.max(-z1).max(zero));
         let distance2 = x.mul_add(x, y.mul_add(y, z * z));
         // The corner farthest along the axis, with a margin for rounding.
         let (mut height, mut margin) = (zero, zero);
@@ -56,20 +62,22 @@ impl<S: Simd> Boxes<S> {
     /// The children that one ray may touch within `t_max`, and where it enters each.
     #[inline(always)]
     pub(crate) fn through(&self, simd: S, inverse: [f32; 3], t_max: f32) -> (u32, f32x8<S>) {
-        let pick = |axis: usize| {
-            let i = f32x8::splat(simd, inverse[axis]);
-            let (lo, hi) = (self.planes[axis] * i, self.planes[axis + 3] * i);
-            (lo.min(hi), lo.max(hi))
-        };
-        let ((x0, x1), (y0, y1), (z0, z1)) = (pick(0), pick(1), pick(2));
-        let enter = x0.max(y0).max(z0.max(0.0));
-        let leave = x1.min(y1).min(z1.min(t_max));
+        let [x0, y0, z0, x1, y1, z1] = self.planes;
+        let [ix, iy, iz] = inverse;
+        let _ = simd;
+        let (ax, bx, ay, by, az, bz) = (x0 * ix, x1 * ix, y0 * iy, y1 * iy, z0 * iz, z1 * iz);
+        let enter = ax.min(bx).max(ay.min(by)).max(az.min(bz).max(0.0));
+        let leave = ax.max(bx).min(ay.max(by)).min(az.max(bz).min(t_max));
         (enter.simd_le(leave * CONSERVATIVE).to_bitmask() as u32, enter)
     }
 
     #[inline(always)]
     fn spread(&self) -> [[f32; WIDTH]; 6] {
-        self.planes.map(<[f32; WIDTH]>::from)
+        let mut planes = [[0.0; WIDTH]; 6];
+        for (out, row) in planes.iter_mut().zip(&self.planes) {
+            row.store_slice(out);
+        }
+        planes
     }
 }
 
@@ -83,14 +91,15 @@ fn rays_through<S: Simd>(
     t_max: f32,
     rays: u64,
 ) -> u64 {
-    let [x0, y0, z0, x1, y1, z1] = planes.map(|row| f32x8::splat(simd, row[slot]));
+    let (x0, y0, z0) = (planes[0][slot], planes[1][slot], planes[2][slot]);
+    let (x1, y1, z1) = (planes[3][slot], planes[4][slot], planes[5][slot]);
     let mut through = 0;
     for chunk in 0..CHUNKS {
         if rays >> (chunk * LANES) & 0xff == 0 {
             continue;
         }
         let [ix, iy, iz] = bundle.chunk(simd, &bundle.inverse, chunk);
-        let (ax, bx, ay, by, az, bz) = (x0 * ix, x1 * ix, y0 * iy, y1 * iy, z0 * iz, z1 * iz);
+        let (ax, bx, ay, by, az, bz) = (ix * x0, ix * x1, iy * y0, iy * y1, iz * z0, iz * z1);
         let enter = ax.min(bx).max(ay.min(by)).max(az.min(bz).max(0.0));
         let leave = ax.max(bx).min(ay.max(by)).min(az.max(bz).min(t_max));
         through |= enter.simd_le(leave * CONSERVATIVE).to_bitmask() << (chunk * LANES);
@@ -114,6 +123,29 @@ impl Blocker<'_> {
     }
 }
 
+/// What a traversal does at leaves. A trait and not a closure, because closures are not compiled for the vectors of their
+/// caller unless they happen to be inlined.
+pub(crate) trait Visitor<S: Simd> {
+    /// Leaves are visited in order of distance like nodes, not as soon as they are met.
+    const IN_ORDER: bool;
+    /// Which of `rays` are blocked in a leaf.
+    fn visit(&mut self, simd: S, range: Range<usize>, rays: u64) -> u64;
+}
+
+struct Leaves<'a> {
+    bundle: &'a Bundle,
+    blocker: Blocker<'a>,
+    t_far: f32,
+}
+
+impl<S: Simd> Visitor<S> for Leaves<'_> {
+    const IN_ORDER: bool = false;
+    #[inline(always)]
+    fn visit(&mut self, simd: S, range: Range<usize>, rays: u64) -> u64 {
+        trace_leaf(simd, self.bundle, self.blocker, &range, self.t_far, rays)
+    }
+}
+
 /// The rays (bits by lane) among `rays` that the mesh blocks. The bundle must be prepared.
 #[inline(always)]
 pub(crate) fn trace_bundle<S: Simd>(simd: S, bundle: &Bundle, blocker: Blocker<'_>, rays: u64) -> u64 {
@@ -123,23 +155,20 @@ pub(crate) fn trace_bundle<S: Simd>(simd: S, bundle: &Bundle, blocker: Blocker<'
         return 0;
     }
     let (reach, t_far) = bundle.reach(simd, &blocker.bvh.bounds);
-    traverse(simd, bundle, &reach, t_far, tree, rays, false, |range, rays| {
-        trace_leaf(simd, bundle, blocker, &range, t_far, rays)
-    })
+    traverse(simd, bundle, &reach, t_far, tree, rays, &mut Leaves { bundle, blocker, t_far })
 }
 
-/// Calls `visit` with leaves and the rays (of `rays`) that may touch them; it returns those that are blocked there, which
-/// go no further. Returns all that are. `in_order`: leaves are visited in order of distance like nodes, not at once.
+/// Calls `visitor` with leaves and the rays (of `rays`) that may touch them; those that are blocked there go no further.
+/// Returns all that are.
 #[inline(always)]
-pub(crate) fn traverse<S: Simd>(
+pub(crate) fn traverse<S: Simd, V: Visitor<S>>(
     simd: S,
     bundle: &Bundle,
     reach: &Reach,
     t_far: f32,
     tree: &Tree,
     rays: u64,
-    in_order: bool,
-    mut visit: impl FnMut(Range<usize>, u64) -> u64,
+    visitor: &mut V,
 ) -> u64 {
     let mut open = rays;
     // A node's index and 0, or a leaf's first primitive and their number.
@@ -149,8 +178,8 @@ pub(crate) fn traverse<S: Simd>(
         if rays == 0 {
             continue;
         }
-        if in_order && count > 0 {
-            open &= !visit(index as usize..(index + count) as usize, rays);
+        if V::IN_ORDER && count > 0 {
+            open &= !visitor.visit(simd, index as usize..(index + count) as usize, rays);
             continue;
         }
         let node = &tree.nodes[index as usize];
@@ -174,9 +203,9 @@ pub(crate) fn traverse<S: Simd>(
             }
             let entry = match node.child(slot) {
                 Child::Inner(child) => (child, 0, rays),
-                Child::Leaf(range) if in_order => (range.start as u32, range.len() as u32, rays),
+                Child::Leaf(range) if V::IN_ORDER => (range.start as u32, range.len() as u32, rays),
                 Child::Leaf(range) => {
-                    open &= !visit(range, rays);
+                    open &= !visitor.visit(simd, range, rays);
                     continue;
                 }
                 Child::Empty => continue,
