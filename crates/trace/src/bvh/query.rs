@@ -5,6 +5,7 @@ use std::ops::Range;
 use dapple_scene::glam::Vec3;
 use fearless_simd::{Simd, dispatch};
 
+use super::alpha::AlphaMaterials;
 use super::bundle::{BUNDLE, Bundle};
 use super::stack::Stack;
 use super::tracer::{Blockers, PlacedBvh, Top, Tracer};
@@ -84,31 +85,18 @@ impl Tracer {
     /// Whether anything blocks the ray.
     pub fn occluded(&self, ray: &Ray) -> bool {
         dispatch!(self.level, simd => {
-            let mut blocked = false;
-            self.visit_instances(simd, ray, |placed, _| {
-                blocked = placed.placement.ray(ray).is_some_and(|r| placed.bvh.any_hit(simd, &r, &self.alpha));
-                if blocked { None } else { Some(ray.t_max) }
-            });
-            blocked
+            let mut any = AnyInstance { alpha: &self.alpha, ray, blocked: false };
+            self.visit_instances(simd, ray, &mut any);
+            any.blocked
         })
     }
 
     /// The nearest thing that the ray meets; of equally near ones that of the lowest instance, then triangle.
     pub fn closest_hit(&self, ray: &Ray) -> Option<Hit> {
         dispatch!(self.level, simd => {
-            let mut best: Option<Hit> = None;
-            self.visit_instances(simd, ray, |placed, instance| {
-                let t_best = best.map_or(ray.t_max, |b| b.t);
-                let mesh_ray = placed.placement.ray(ray);
-                let found = mesh_ray.and_then(|r| placed.bvh.closest_hit(simd, &r, t_best, &self.alpha));
-                if let Some((triangle, hit)) = found
-                    && best.is_none_or(|b| hit.t < b.t || instance < b.instance)
-                {
-                    best = Some(hit_of(instance, triangle, &hit));
-                }
-                Some(best.map_or(ray.t_max, |b| b.t))
-            });
-            best
+            let mut closest = ClosestInstance { alpha: &self.alpha, ray, best: None };
+            self.visit_instances(simd, ray, &mut closest);
+            closest.best
         })
     }
 
@@ -118,14 +106,7 @@ impl Tracer {
     pub fn all_hits(&self, ray: &Ray, hits: &mut Vec<Hit>) {
         hits.clear();
         dispatch!(self.level, simd => {
-            self.visit_instances(simd, ray, |placed, instance| {
-                if let Some(r) = placed.placement.ray(ray) {
-                    placed.bvh.all_hits(simd, &r, &self.alpha, &mut |triangle, hit| {
-                        hits.push(hit_of(instance, triangle, &hit));
-                    });
-                }
-                Some(ray.t_max)
-            })
+            self.visit_instances(simd, ray, &mut AllInstances { alpha: &self.alpha, ray, hits })
         });
         let order = |a: &Hit, b: &Hit| {
             a.t.total_cmp(&b.t).then((a.instance, a.triangle).cmp(&(b.instance, b.triangle)))
@@ -133,15 +114,9 @@ impl Tracer {
         hits.sort_unstable_by(order);
     }
 
-    /// Calls `visit` for instances whose box the ray may touch; it returns how far the ray still goes, or `None` to
-    /// end.
+    /// Shows the instances whose box the ray may touch to `visitor`, near ones first.
     #[inline(always)]
-    fn visit_instances<'a, S: Simd>(
-        &'a self,
-        simd: S,
-        ray: &Ray,
-        mut visit: impl FnMut(&'a PlacedBvh, u32) -> Option<f32>,
-    ) {
+    fn visit_instances<S: Simd>(&self, simd: S, ray: &Ray, visitor: &mut impl InstanceVisitor<S>) {
         let Some(world) = MeshRay::new(ray.origin_world, ray.direction_world, ray.t_max) else { return };
         let mut t_max = ray.t_max;
         for top in [&self.still, &self.moving].into_iter().filter(|top| !top.tree.nodes.is_empty()) {
@@ -155,14 +130,14 @@ impl Tracer {
                 if index >= nodes {
                     let instance = top.tree.order[(index - nodes) as usize];
                     let Some(placed) = &self.instances[instance as usize] else { continue };
-                    match visit(placed, instance) {
+                    match visitor.visit(simd, placed, instance) {
                         Some(t) => t_max = t,
                         None => return,
                     }
                     continue;
                 }
                 let node = &top.tree.nodes[index as usize];
-                let (mut slots, enter) = Boxes::new(simd, node, &world.origin).through(simd, world.inverse, t_max);
+                let (mut slots, enter) = Boxes::new(simd, node, &world.origin).through(world.inverse, t_max);
                 let enter = <[f32; WIDTH]>::from(enter);
                 let mut met = [(0.0_f32, 0_u32); WIDTH];
                 let mut count = 0;
@@ -188,6 +163,63 @@ impl Tracer {
                 }
             }
         }
+    }
+}
+
+/// What a single ray does at an instance: how far it still goes, `None` to end.
+trait InstanceVisitor<S: Simd> {
+    fn visit(&mut self, simd: S, placed: &PlacedBvh, instance: u32) -> Option<f32>;
+}
+
+struct AnyInstance<'a> {
+    alpha: &'a AlphaMaterials,
+    ray: &'a Ray,
+    blocked: bool,
+}
+
+impl<S: Simd> InstanceVisitor<S> for AnyInstance<'_> {
+    #[inline(always)]
+    fn visit(&mut self, simd: S, placed: &PlacedBvh, _: u32) -> Option<f32> {
+        let ray = placed.placement.ray(self.ray);
+        self.blocked = ray.is_some_and(|ray| placed.bvh.any_hit(simd, 0, &ray, self.alpha));
+        if self.blocked { None } else { Some(self.ray.t_max) }
+    }
+}
+
+struct ClosestInstance<'a> {
+    alpha: &'a AlphaMaterials,
+    ray: &'a Ray,
+    best: Option<Hit>,
+}
+
+impl<S: Simd> InstanceVisitor<S> for ClosestInstance<'_> {
+    #[inline(always)]
+    fn visit(&mut self, simd: S, placed: &PlacedBvh, instance: u32) -> Option<f32> {
+        let t_best = self.best.map_or(self.ray.t_max, |b| b.t);
+        if let Some(ray) = placed.placement.ray(self.ray)
+            && let Some((triangle, hit)) = placed.bvh.closest_hit(simd, &ray, t_best, self.alpha)
+            && self.best.is_none_or(|b| hit.t < b.t || instance < b.instance)
+        {
+            self.best = Some(hit_of(instance, triangle, &hit));
+        }
+        Some(self.best.map_or(self.ray.t_max, |b| b.t))
+    }
+}
+
+struct AllInstances<'a> {
+    alpha: &'a AlphaMaterials,
+    ray: &'a Ray,
+    hits: &'a mut Vec<Hit>,
+}
+
+impl<S: Simd> InstanceVisitor<S> for AllInstances<'_> {
+    #[inline(always)]
+    fn visit(&mut self, simd: S, placed: &PlacedBvh, instance: u32) -> Option<f32> {
+        if let Some(ray) = placed.placement.ray(self.ray) {
+            let found = |triangle, hit: TriangleHit| self.hits.push(hit_of(instance, triangle, &hit));
+            placed.bvh.all_hits(simd, &ray, self.alpha, found);
+        }
+        Some(self.ray.t_max)
     }
 }
 

@@ -1,5 +1,7 @@
 //! Single rays through one tree.
 
+use std::ops::Range;
+
 use fearless_simd::Simd;
 
 use super::alpha::AlphaMaterials;
@@ -10,24 +12,83 @@ use super::traverse::Boxes;
 use super::tree::{CONSERVATIVE, Child, WIDTH};
 use super::triangle::{MeshRay, TriangleHit};
 
-impl MeshBvh {
-    /// Whether anything blocks the ray.
+/// What becomes of the triangles that a ray may meet. A trait and not a closure, as [`super::traverse::Visitor`].
+trait Candidates {
+    /// Some triangles of a leaf may be met (bits by lane), some of those for sure. How far the ray still goes; `None`
+    /// ends it.
+    fn meet(&mut self, leaf: &Range<usize>, maybe: u32, sure: u32, t_far: f32) -> Option<f32>;
+}
+
+struct AnyHit<'a> {
+    bvh: &'a MeshBvh,
+    ray: &'a MeshRay,
+    alpha: &'a AlphaMaterials,
+    blocked: bool,
+}
+
+impl Candidates for AnyHit<'_> {
     #[inline(always)]
-    pub(crate) fn any_hit<S: Simd>(&self, simd: S, ray: &MeshRay, alpha: &AlphaMaterials) -> bool {
-        let mut blocked = false;
-        let t_far = self.t_far(ray);
-        self.visit_leaves(simd, ray, t_far, |simd, range, t_far| {
-            let block = self.block(simd, ray, &range, t_far);
-            let (mut maybe, sure) = block.test(simd, ray.direction);
-            blocked = sure & !self.special_lanes(&range) != 0;
-            while maybe != 0 && !blocked {
-                let lane = maybe.trailing_zeros() as usize;
-                maybe &= maybe - 1;
-                blocked = self.exact_hit(ray, &range, lane, alpha).is_some();
+    fn meet(&mut self, leaf: &Range<usize>, mut maybe: u32, sure: u32, t_far: f32) -> Option<f32> {
+        self.blocked = sure & !self.bvh.special_lanes(leaf) != 0;
+        while maybe != 0 && !self.blocked {
+            let lane = maybe.trailing_zeros() as usize;
+            maybe &= maybe - 1;
+            self.blocked = self.bvh.exact_hit(self.ray, leaf, lane, self.alpha).is_some();
+        }
+        if self.blocked { None } else { Some(t_far) }
+    }
+}
+
+struct ClosestHit<'a> {
+    bvh: &'a MeshBvh,
+    ray: &'a MeshRay,
+    alpha: &'a AlphaMaterials,
+    best: Option<(u32, TriangleHit)>,
+}
+
+impl Candidates for ClosestHit<'_> {
+    fn meet(&mut self, leaf: &Range<usize>, mut maybe: u32, _: u32, mut t_far: f32) -> Option<f32> {
+        while maybe != 0 {
+            let lane = maybe.trailing_zeros() as usize;
+            maybe &= maybe - 1;
+            if let Some((id, hit)) = self.bvh.exact_hit(self.ray, leaf, lane, self.alpha)
+                && self.best.as_ref().is_none_or(|(i, b)| hit.t < b.t || (hit.t == b.t && id < *i))
+            {
+                t_far = t_far.min(hit.t);
+                self.best = Some((id, hit));
             }
-            if blocked { None } else { Some(t_far) }
-        });
-        blocked
+        }
+        Some(t_far)
+    }
+}
+
+struct AllHits<'a, F> {
+    bvh: &'a MeshBvh,
+    ray: &'a MeshRay,
+    alpha: &'a AlphaMaterials,
+    found: F,
+}
+
+impl<F: FnMut(u32, TriangleHit)> Candidates for AllHits<'_, F> {
+    fn meet(&mut self, leaf: &Range<usize>, mut maybe: u32, _: u32, t_far: f32) -> Option<f32> {
+        while maybe != 0 {
+            let lane = maybe.trailing_zeros() as usize;
+            maybe &= maybe - 1;
+            if let Some((id, hit)) = self.bvh.exact_hit(self.ray, leaf, lane, self.alpha) {
+                (self.found)(id, hit);
+            }
+        }
+        Some(t_far)
+    }
+}
+
+impl MeshBvh {
+    /// Whether anything in the subtree of the node `root` blocks the ray.
+    #[inline(always)]
+    pub(crate) fn any_hit<S: Simd>(&self, simd: S, root: u32, ray: &MeshRay, alpha: &AlphaMaterials) -> bool {
+        let mut any = AnyHit { bvh: self, ray, alpha, blocked: false };
+        self.visit_leaves(simd, root, ray, self.t_far(ray), &mut any);
+        any.blocked
     }
 
     /// The nearest hit not beyond `t_best`; among equally near ones the triangle of lowest index.
@@ -39,26 +100,10 @@ impl MeshBvh {
         t_best: f32,
         alpha: &AlphaMaterials,
     ) -> Option<(u32, TriangleHit)> {
-        let mut best: Option<(u32, TriangleHit)> = None;
-        let mut ray = *ray;
-        ray.t_max = ray.t_max.min(t_best);
-        let t_far = self.t_far(&ray);
-        self.visit_leaves(simd, &ray, t_far, |simd, range, t_far| {
-            let (mut maybe, _) = self.block(simd, &ray, &range, t_far).test(simd, ray.direction);
-            let mut t_far = t_far;
-            while maybe != 0 {
-                let lane = maybe.trailing_zeros() as usize;
-                maybe &= maybe - 1;
-                if let Some((id, hit)) = self.exact_hit(&ray, &range, lane, alpha)
-                    && best.as_ref().is_none_or(|(i, b)| hit.t < b.t || (hit.t == b.t && id < *i))
-                {
-                    t_far = t_far.min(hit.t);
-                    best = Some((id, hit));
-                }
-            }
-            Some(t_far)
-        });
-        best
+        let ray = &MeshRay { t_max: ray.t_max.min(t_best), ..*ray };
+        let mut closest = ClosestHit { bvh: self, ray, alpha, best: None };
+        self.visit_leaves(simd, 0, ray, self.t_far(ray), &mut closest);
+        closest.best
     }
 
     /// Calls `found` with everything that the ray meets, in no order.
@@ -68,20 +113,10 @@ impl MeshBvh {
         simd: S,
         ray: &MeshRay,
         alpha: &AlphaMaterials,
-        found: &mut impl FnMut(u32, TriangleHit),
+        found: impl FnMut(u32, TriangleHit),
     ) {
-        let t_far = self.t_far(ray);
-        self.visit_leaves(simd, ray, t_far, |simd, range, t_far| {
-            let (mut maybe, _) = self.block(simd, ray, &range, t_far).test(simd, ray.direction);
-            while maybe != 0 {
-                let lane = maybe.trailing_zeros() as usize;
-                maybe &= maybe - 1;
-                if let Some((id, hit)) = self.exact_hit(ray, &range, lane, alpha) {
-                    found(id, hit);
-                }
-            }
-            Some(t_far)
-        });
+        let mut all = AllHits { bvh: self, ray, alpha, found };
+        self.visit_leaves(simd, 0, ray, self.t_far(ray), &mut all);
     }
 
     /// How far the ray needs to go to pass all of the tree: finite, at most its own length.
@@ -95,33 +130,27 @@ impl MeshBvh {
         ray.t_max.min(8.0 * extent * ray.shear[2].abs()).min(f32::MAX)
     }
 
-    #[inline(always)]
-    fn block<S: Simd>(&self, simd: S, ray: &MeshRay, range: &std::ops::Range<usize>, t_far: f32) -> Block<S> {
-        let rows = self.triangles.load(simd, range);
-        let direction_max = ray.direction[ray.axes[2]].abs();
-        Block::new(simd, &rows, range.len(), &ray.origin, t_far, direction_max)
-    }
-
-    /// Calls `visit` with leaves whose box the ray may touch, near ones mostly first; it returns how far the ray still
-    /// goes, or `None` to end.
+    /// Shows the leaves whose box the ray may touch within `t_far` to `candidates`, near ones mostly first.
     #[inline(always)]
     fn visit_leaves<S: Simd>(
         &self,
         simd: S,
+        root: u32,
         ray: &MeshRay,
         mut t_far: f32,
-        mut visit: impl FnMut(S, std::ops::Range<usize>, f32) -> Option<f32>,
+        candidates: &mut impl Candidates,
     ) {
         if self.tree.nodes.is_empty() {
             return;
         }
-        let mut stack: Stack<(f32, u32)> = Stack::new((0.0, 0));
+        let direction_max = ray.direction[ray.axes[2]].abs();
+        let mut stack: Stack<(f32, u32)> = Stack::new((0.0, root));
         while let Some((enter, index)) = stack.pop() {
             if enter > t_far * CONSERVATIVE {
                 continue;
             }
             let node = &self.tree.nodes[index as usize];
-            let (mut slots, enter) = Boxes::new(simd, node, &ray.origin).through(simd, ray.inverse, t_far);
+            let (mut slots, enter) = Boxes::new(simd, node, &ray.origin).through(ray.inverse, t_far);
             if slots == 0 {
                 continue;
             }
@@ -141,10 +170,17 @@ impl MeshBvh {
                         inner[at] = (enter[slot], child);
                         count += 1;
                     }
-                    Child::Leaf(range) => match visit(simd, range, t_far) {
-                        Some(t) => t_far = t,
-                        None => return,
-                    },
+                    Child::Leaf(leaf) => {
+                        let rows = self.triangles.load(simd, &leaf);
+                        let block = Block::new(simd, &rows, leaf.len(), &ray.origin, t_far, direction_max);
+                        let (maybe, sure) = block.test(simd, ray.direction);
+                        if maybe != 0 {
+                            match candidates.meet(&leaf, maybe, sure, t_far) {
+                                Some(t) => t_far = t,
+                                None => return,
+                            }
+                        }
+                    }
                     Child::Empty => {}
                 }
             }

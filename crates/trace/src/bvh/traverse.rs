@@ -61,10 +61,9 @@ impl<S: Simd> Boxes<S> {
 
     /// The children that one ray may touch within `t_max`, and where it enters each.
     #[inline(always)]
-    pub(crate) fn through(&self, simd: S, inverse: [f32; 3], t_max: f32) -> (u32, f32x8<S>) {
+    pub(crate) fn through(&self, inverse: [f32; 3], t_max: f32) -> (u32, f32x8<S>) {
         let [x0, y0, z0, x1, y1, z1] = self.planes;
         let [ix, iy, iz] = inverse;
-        let _ = simd;
         let (ax, bx, ay, by, az, bz) = (x0 * ix, x1 * ix, y0 * iy, y1 * iy, z0 * iz, z1 * iz);
         let enter = ax.min(bx).max(ay.min(by)).max(az.min(bz).max(0.0));
         let leave = ax.max(bx).min(ay.max(by)).min(az.max(bz).min(t_max));
@@ -130,7 +129,15 @@ pub(crate) trait Visitor<S: Simd> {
     const IN_ORDER: bool;
     /// Which of `rays` are blocked in a leaf.
     fn visit(&mut self, simd: S, range: Range<usize>, rays: u64) -> u64;
+    /// Which of few `rays` are blocked in a node, found one by one; `None` if they are to go on together.
+    #[inline(always)]
+    fn few(&mut self, _: S, _node: u32, _rays: u64) -> Option<u64> {
+        None
+    }
 }
+
+/// This few rays go on alone, each to what is nearest to it.
+const FEW: u32 = 3;
 
 struct Leaves<'a> {
     bundle: &'a Bundle,
@@ -143,6 +150,23 @@ impl<S: Simd> Visitor<S> for Leaves<'_> {
     #[inline(always)]
     fn visit(&mut self, simd: S, range: Range<usize>, rays: u64) -> u64 {
         trace_leaf(simd, self.bundle, self.blocker, &range, self.t_far, rays)
+    }
+
+    #[inline(always)]
+    fn few(&mut self, simd: S, node: u32, mut rays: u64) -> Option<u64> {
+        if rays.count_ones() > FEW {
+            return None;
+        }
+        let mut blocked = 0;
+        while rays != 0 {
+            let lane = rays.trailing_zeros() as usize;
+            rays &= rays - 1;
+            let ray = self.bundle.ray(lane);
+            if ray.is_some_and(|ray| self.blocker.bvh.any_hit(simd, node, &ray, self.blocker.alpha)) {
+                blocked |= 1 << lane;
+            }
+        }
+        Some(blocked)
     }
 }
 
@@ -180,6 +204,10 @@ pub(crate) fn traverse<S: Simd, V: Visitor<S>>(
         }
         if V::IN_ORDER && count > 0 {
             open &= !visitor.visit(simd, index as usize..(index + count) as usize, rays);
+            continue;
+        }
+        if let Some(blocked) = visitor.few(simd, index, rays) {
+            open &= !blocked;
             continue;
         }
         let node = &tree.nodes[index as usize];
@@ -252,7 +280,7 @@ fn rays_by_child<S: Simd>(
         let lane = rest.trailing_zeros() as usize;
         rest &= rest - 1;
         let inverse = [0, 1, 2].map(|axis| bundle.inverse[axis][lane]);
-        children[lane] = boxes.through(simd, inverse, t_far).0 as u8;
+        children[lane] = boxes.through(inverse, t_far).0 as u8;
     }
     let children = u8x64::load_array(simd, children);
     while slots != 0 {
