@@ -6,7 +6,7 @@ use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x8};
 
 use super::placement::Placement;
 use super::tree::CONSERVATIVE;
-use super::triangle::MeshRay;
+use super::triangle::QuickRay;
 
 /// Rays in a bundle: one bit each.
 pub(crate) const BUNDLE: usize = 64;
@@ -61,42 +61,14 @@ impl Bundle {
         }
     }
 
-    /// Takes up to [`BUNDLE`] directions and puts those of one sector of the sky side by side, so that they meet the same
-    /// boxes. Returns the caller's index of each lane's ray.
-    pub(crate) fn fill(&mut self, origin: Vec3, directions: &[Vec3], t_max: f32) -> [u8; BUNDLE] {
+    /// Takes up to [`BUNDLE`] directions.
+    pub(crate) fn fill(&mut self, origin: Vec3, directions: &[Vec3], t_max: f32) {
         self.origin = origin.to_array();
         self.t_max = t_max;
-        let directions = &directions[..directions.len().min(BUNDLE)];
-        // Eight sectors about the mean direction.
-        let mean = directions.iter().fold(Vec3::ZERO, |sum, d| sum + *d);
-        let (u, v) = across(mean);
-        let mut sectors = [0_u8; BUNDLE];
-        let mut first = [0_u8; 9];
-        for (sector, d) in sectors.iter_mut().zip(directions) {
-            let (x, y) = (u.dot(*d), v.dot(*d));
-            // Neighbouring numbers are neighbouring sectors.
-            let quarter = if y < 0.0 { 2 + u8::from(x >= 0.0) } else { u8::from(x < 0.0) };
-            let steep = u8::from(y.abs() > x.abs());
-            *sector = 2 * quarter + (steep ^ (quarter & 1));
-            first[usize::from(*sector) + 1] += 1;
+        let [x, y, z] = &mut self.directions;
+        for (((x, y), z), d) in x.iter_mut().zip(y).zip(z).zip(directions) {
+            [*x, *y, *z] = d.to_array();
         }
-        for i in 1..9 {
-            first[i] += first[i - 1];
-        }
-        let mut source = [0_u8; BUNDLE];
-        for (i, d) in directions.iter().enumerate() {
-            let lane = &mut first[usize::from(sectors[i])];
-            let at = usize::from(*lane);
-            *lane += 1;
-            source[at] = i as u8;
-            for (row, x) in self.directions.iter_mut().zip(d.to_array()) {
-                row[at] = x;
-            }
-        }
-        for row in &mut self.directions {
-            row[directions.len()..].fill(0.0);
-        }
-        source
     }
 
     /// The same rays in a mesh's space, lane by lane, in groups that hold `wanted` ones.
@@ -207,21 +179,22 @@ impl Bundle {
         (reach, t_far)
     }
 
-    /// One lane's ray, for the exact test.
-    #[cold]
-    pub(crate) fn ray(&self, lane: usize) -> Option<MeshRay> {
-        MeshRay::new(Vec3::from_array(self.origin), Vec3::from_array(self.direction(lane)), self.t_max)
+    /// One lane's ray.
+    #[inline(always)]
+    pub(crate) fn ray(&self, lane: usize, t_far: f32) -> QuickRay {
+        QuickRay {
+            origin: self.origin,
+            direction: self.direction(lane),
+            inverse: [self.inverse[0][lane], self.inverse[1][lane], self.inverse[2][lane]],
+            direction_max: self.direction_max,
+            t_max: self.t_max,
+            t_far,
+        }
     }
 
     /// One lane's direction.
     #[inline(always)]
     pub(crate) fn direction(&self, lane: usize) -> [f32; 3] {
-        [0, 1, 2].map(|axis| self.directions[axis][lane])
+        [self.directions[0][lane], self.directions[1][lane], self.directions[2][lane]]
     }
-}
-
-/// Two directions across another one; any two across the vertical if it is none.
-fn across(along: Vec3) -> (Vec3, Vec3) {
-    let Some(w) = along.try_normalize() else { return (Vec3::X, Vec3::Z) };
-    crate::sampling::orthonormal_basis(w)
 }

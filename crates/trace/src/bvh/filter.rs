@@ -13,6 +13,7 @@
 use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x8};
 
 use super::leaf::{LANES, Rows};
+use super::triangle::QuickRay;
 
 /// Bound of the error of d · nᵢ over (largest coordinate × longest edge × largest direction): 84 roundings for the
 /// longest coordinate of any edge, which is at most twice that of the two edges that are looked at.
@@ -154,6 +155,47 @@ impl<S: Simd> Block<S> {
         self.reach_error.store_slice(&mut rows[14]);
         Spread { rows }
     }
+}
+
+/// Which of the triangles in `lanes` one ray may meet, and which of those it does for sure.
+///
+/// The same decisions as [`Block`]'s, by \[Moller1997\]: u = (o − a) · (d × ac), v = d · ((o − a) × ab), with
+/// N · d = u + v + w; there is nothing to share with other rays, and this is half the work. The bounds hold as well:
+/// u, v and w are sums of the same products.
+///
+/// \[Moller1997\]: T. Möller, B. Trumbore, "Fast, Minimum Storage Ray-Triangle Intersection", JGT 2 (1), 1997.
+#[inline(always)]
+pub(crate) fn test_one<S: Simd>(simd: S, rows: &Rows<S>, lanes: u32, ray: &QuickRay) -> (u32, u32) {
+    let [ax, ay, az, bx, by, bz, cx, cy, cz] = *rows;
+    let (o, d) = (splat3(simd, &ray.origin), splat3(simd, &ray.direction));
+    let a = [ax, ay, az];
+    let (ab, ac, at) = (sub(&[bx, by, bz], &a), sub(&[cx, cy, cz], &a), sub(&o, &a));
+    let p = cross(&d, &ac);
+    let along = dot(&ab, &p);
+    let q = cross(&at, &ab);
+    let (u, v, t) = (dot(&at, &p), dot(&d, &q), dot(&ac, &q));
+    // All of it as if the triangle were met from its front.
+    let one = f32x8::splat(simd, 1.0).copysign(along);
+    let (along, u, v, t) = (along * one, u * one, v * one, t * one);
+
+    let edge = largest(&ab).max(largest(&ac));
+    let coordinate = largest(&at) + edge;
+    let edge_error = (coordinate * edge)
+        .mul_add(EDGE_ERROR * ray.direction_max, UNDERFLOW * (1.0 + ray.direction_max));
+    let reach = coordinate + ray.t_far * ray.direction_max;
+    let reach_error =
+        (edge * edge * reach).mul_add(REACH_ERROR, UNDERFLOW * (1.0 + ray.direction_max * (1.0 + ray.t_far)));
+    let inside = u.min(v).min(along - u - v);
+    let reach = (along * ray.t_far - t).min(t);
+    // Seen edge-on the sign says nothing; but u + v + w is almost 0 then, so that either sign leaves one far below 0.
+    let out = (inside.simd_lt(-edge_error) | reach.simd_lt(-reach_error)) & along.simd_gt(edge_error);
+    let out = out | inside.simd_lt(edge_error * -6.0);
+    let maybe = !(out.to_bitmask() as u32) & lanes;
+    if maybe == 0 {
+        return (0, 0);
+    }
+    let sure = (inside.simd_gt(edge_error) & reach.simd_gt(reach_error)).to_bitmask() as u32;
+    (maybe, maybe & sure)
 }
 
 /// A block in memory, to take single lanes from.

@@ -6,7 +6,7 @@ use dapple_scene::glam::Vec3;
 use fearless_simd::{Simd, dispatch};
 
 use super::alpha::AlphaMaterials;
-use super::bundle::{BUNDLE, Bundle};
+use super::bundle::{BUNDLE, Bundle, Reach};
 use super::stack::Stack;
 use super::tracer::{Blockers, PlacedBvh, Top, Tracer};
 use super::traverse::{Blocker, Boxes, Visitor, trace_bundle, traverse};
@@ -60,26 +60,20 @@ impl Tracer {
         open: u64,
     ) -> u64 {
         let mut world = Bundle::new();
-        let source = world.fill(origin_world, directions_world, t_max);
-        let lanes = source[..directions_world.len()].iter().enumerate();
-        let wanted = lanes.fold(0_u64, |lanes, (lane, &i)| lanes | (open >> i & 1) << lane);
-        world.prepare(simd, wanted);
+        world.fill(origin_world, directions_world, t_max);
+        world.prepare(simd, open);
         let mut open = world.valid;
         let mut blocked = 0;
-        let mut mesh = Bundle::new();
+        let mut mesh = None;
         for top in tops.iter().flatten().filter(|top| !top.tree.nodes.is_empty()) {
             let (reach, t_far) = world.reach(simd, &top.bounds);
-            let mut visitor = Instances { tracer: self, top, world: &world, mesh: &mut mesh };
-            let hit = traverse(simd, &world, &reach, t_far, &top.tree, open, &mut visitor);
+            let mut instances =
+                Instances { tracer: self, top, world: &world, reach: &reach, t_far, mesh: &mut mesh };
+            let hit = traverse(simd, &world, &reach, t_far, &top.tree, open, &mut instances);
             open &= !hit;
             blocked |= hit;
         }
-        let mut found = 0;
-        while blocked != 0 {
-            found |= 1 << source[blocked.trailing_zeros() as usize];
-            blocked &= blocked - 1;
-        }
-        found
+        blocked
     }
 
     /// Whether anything blocks the ray.
@@ -122,7 +116,7 @@ impl Tracer {
         for top in [&self.still, &self.moving].into_iter().filter(|top| !top.tree.nodes.is_empty()) {
             // Leaves by their index beyond the nodes'.
             let nodes = top.tree.nodes.len() as u32;
-            let mut stack: Stack<(f32, u32)> = Stack::new((0.0, 0));
+            let mut stack: Stack<(f32, u32), 24> = Stack::new((0.0, 0));
             while let Some((enter, index)) = stack.pop() {
                 if enter > t_max * CONSERVATIVE {
                     continue;
@@ -181,7 +175,7 @@ impl<S: Simd> InstanceVisitor<S> for AnyInstance<'_> {
     #[inline(always)]
     fn visit(&mut self, simd: S, placed: &PlacedBvh, _: u32) -> Option<f32> {
         let ray = placed.placement.ray(self.ray);
-        self.blocked = ray.is_some_and(|ray| placed.bvh.any_hit(simd, 0, &ray, self.alpha));
+        self.blocked = ray.is_some_and(|ray| placed.bvh.any_hit(simd, 0, &placed.bvh.quick(&ray), self.alpha));
         if self.blocked { None } else { Some(self.ray.t_max) }
     }
 }
@@ -228,7 +222,10 @@ struct Instances<'a> {
     tracer: &'a Tracer,
     top: &'a Top,
     world: &'a Bundle,
-    mesh: &'a mut Bundle,
+    reach: &'a Reach,
+    t_far: f32,
+    /// Made by the first instance that needs it.
+    mesh: &'a mut Option<Bundle>,
 }
 
 impl<S: Simd> Visitor<S> for Instances<'_> {
@@ -237,13 +234,15 @@ impl<S: Simd> Visitor<S> for Instances<'_> {
     fn visit(&mut self, simd: S, range: Range<usize>, rays: u64) -> u64 {
         let instance = self.top.tree.order[range.start];
         let Some(placed) = &self.tracer.instances[instance as usize] else { return 0 };
-        let mut bundle = self.world;
-        if !placed.placement.identity {
-            self.mesh.place(simd, self.world, &placed.placement, rays);
-            self.mesh.prepare(simd, rays);
-            bundle = self.mesh;
+        let blocker = Blocker { bvh: &placed.bvh, alpha: &self.tracer.alpha };
+        if placed.placement.identity {
+            return trace_bundle(simd, self.world, self.reach, self.t_far, blocker, rays);
         }
-        trace_bundle(simd, bundle, Blocker { bvh: &placed.bvh, alpha: &self.tracer.alpha }, rays)
+        let mesh = self.mesh.get_or_insert_with(Bundle::new);
+        mesh.place(simd, self.world, &placed.placement, rays);
+        mesh.prepare(simd, rays);
+        let (reach, t_far) = mesh.reach(simd, &placed.bvh.bounds);
+        trace_bundle(simd, mesh, &reach, t_far, blocker, rays)
     }
 }
 

@@ -5,12 +5,12 @@ use std::ops::Range;
 use fearless_simd::Simd;
 
 use super::alpha::AlphaMaterials;
-use super::filter::Block;
+use super::filter::test_one;
 use super::mesh::MeshBvh;
 use super::stack::Stack;
 use super::traverse::Boxes;
 use super::tree::{CONSERVATIVE, Child, WIDTH};
-use super::triangle::{MeshRay, TriangleHit};
+use super::triangle::{MeshRay, QuickRay, TriangleHit};
 
 /// What becomes of the triangles that a ray may meet. A trait and not a closure, as [`super::traverse::Visitor`].
 trait Candidates {
@@ -21,9 +21,17 @@ trait Candidates {
 
 struct AnyHit<'a> {
     bvh: &'a MeshBvh,
-    ray: &'a MeshRay,
+    ray: &'a QuickRay,
     alpha: &'a AlphaMaterials,
     blocked: bool,
+}
+
+impl AnyHit<'_> {
+    #[cold]
+    #[inline(never)]
+    fn exact(&self, leaf: &Range<usize>, lane: usize) -> bool {
+        self.ray.exact().is_some_and(|ray| self.bvh.exact_hit(&ray, leaf, lane, self.alpha).is_some())
+    }
 }
 
 impl Candidates for AnyHit<'_> {
@@ -33,7 +41,7 @@ impl Candidates for AnyHit<'_> {
         while maybe != 0 && !self.blocked {
             let lane = maybe.trailing_zeros() as usize;
             maybe &= maybe - 1;
-            self.blocked = self.bvh.exact_hit(self.ray, leaf, lane, self.alpha).is_some();
+            self.blocked = self.exact(leaf, lane);
         }
         if self.blocked { None } else { Some(t_far) }
     }
@@ -85,9 +93,9 @@ impl<F: FnMut(u32, TriangleHit)> Candidates for AllHits<'_, F> {
 impl MeshBvh {
     /// Whether anything in the subtree of the node `root` blocks the ray.
     #[inline(always)]
-    pub(crate) fn any_hit<S: Simd>(&self, simd: S, root: u32, ray: &MeshRay, alpha: &AlphaMaterials) -> bool {
+    pub(crate) fn any_hit<S: Simd>(&self, simd: S, root: u32, ray: &QuickRay, alpha: &AlphaMaterials) -> bool {
         let mut any = AnyHit { bvh: self, ray, alpha, blocked: false };
-        self.visit_leaves(simd, root, ray, self.t_far(ray), &mut any);
+        self.visit_leaves(simd, root, ray, &mut any);
         any.blocked
     }
 
@@ -102,7 +110,7 @@ impl MeshBvh {
     ) -> Option<(u32, TriangleHit)> {
         let ray = &MeshRay { t_max: ray.t_max.min(t_best), ..*ray };
         let mut closest = ClosestHit { bvh: self, ray, alpha, best: None };
-        self.visit_leaves(simd, 0, ray, self.t_far(ray), &mut closest);
+        self.visit_leaves(simd, 0, &self.quick(ray), &mut closest);
         closest.best
     }
 
@@ -116,41 +124,47 @@ impl MeshBvh {
         found: impl FnMut(u32, TriangleHit),
     ) {
         let mut all = AllHits { bvh: self, ray, alpha, found };
-        self.visit_leaves(simd, 0, ray, self.t_far(ray), &mut all);
+        self.visit_leaves(simd, 0, &self.quick(ray), &mut all);
     }
 
-    /// How far the ray needs to go to pass all of the tree: finite, at most its own length.
+    /// A ray as far as it needs to go to pass all of the tree.
     #[inline(always)]
-    fn t_far(&self, ray: &MeshRay) -> f32 {
+    pub(crate) fn quick(&self, ray: &MeshRay) -> QuickRay {
         let mut extent = 0.0_f32;
         for axis in 0..3 {
             let (lo, hi) = (self.bounds.min[axis] - ray.origin[axis], self.bounds.max[axis] - ray.origin[axis]);
             extent = extent.max(lo.abs()).max(hi.abs());
         }
-        ray.t_max.min(8.0 * extent * ray.shear[2].abs()).min(f32::MAX)
+        QuickRay {
+            origin: ray.origin,
+            direction: ray.direction,
+            inverse: ray.inverse,
+            direction_max: ray.direction[ray.axes[2]].abs(),
+            t_max: ray.t_max,
+            t_far: ray.t_max.min(8.0 * extent * ray.shear[2].abs()).min(f32::MAX),
+        }
     }
 
-    /// Shows the leaves whose box the ray may touch within `t_far` to `candidates`, near ones mostly first.
+    /// Shows the leaves whose box the ray may touch to `candidates`, near ones mostly first.
     #[inline(always)]
     fn visit_leaves<S: Simd>(
         &self,
         simd: S,
         root: u32,
-        ray: &MeshRay,
-        mut t_far: f32,
+        ray: &QuickRay,
         candidates: &mut impl Candidates,
     ) {
         if self.tree.nodes.is_empty() {
             return;
         }
-        let direction_max = ray.direction[ray.axes[2]].abs();
-        let mut stack: Stack<(f32, u32)> = Stack::new((0.0, root));
+        let mut ray = *ray;
+        let mut stack: Stack<(f32, u32), 40> = Stack::new((0.0, root));
         while let Some((enter, index)) = stack.pop() {
-            if enter > t_far * CONSERVATIVE {
+            if enter > ray.t_far * CONSERVATIVE {
                 continue;
             }
             let node = &self.tree.nodes[index as usize];
-            let (mut slots, enter) = Boxes::new(simd, node, &ray.origin).through(ray.inverse, t_far);
+            let (mut slots, enter) = Boxes::new(simd, node, &ray.origin).through(ray.inverse, ray.t_far);
             if slots == 0 {
                 continue;
             }
@@ -172,11 +186,10 @@ impl MeshBvh {
                     }
                     Child::Leaf(leaf) => {
                         let rows = self.triangles.load(simd, &leaf);
-                        let block = Block::new(simd, &rows, leaf.len(), &ray.origin, t_far, direction_max);
-                        let (maybe, sure) = block.test(simd, ray.direction);
+                        let (maybe, sure) = test_one(simd, &rows, (1 << leaf.len()) - 1, &ray);
                         if maybe != 0 {
-                            match candidates.meet(&leaf, maybe, sure, t_far) {
-                                Some(t) => t_far = t,
+                            match candidates.meet(&leaf, maybe, sure, ray.t_far) {
+                                Some(t) => ray.t_far = t,
                                 None => return,
                             }
                         }

@@ -1,16 +1,15 @@
 //! What is still to be visited.
 
 /// A stack that lives in the caller's frame unless a tree is degenerate.
-pub(crate) struct Stack<T> {
+pub(crate) struct Stack<T, const INLINE: usize> {
     inline: [T; INLINE],
     len: usize,
     spilled: Vec<T>,
 }
 
-const INLINE: usize = 96;
-
-impl<T: Copy + Default> Stack<T> {
-    pub(crate) fn new(root: T) -> Stack<T> {
+impl<T: Copy + Default, const INLINE: usize> Stack<T, INLINE> {
+    #[inline(always)]
+    pub(crate) fn new(root: T) -> Stack<T, INLINE> {
         let mut inline = [T::default(); INLINE];
         inline[0] = root;
         Stack { inline, len: 1, spilled: Vec::new() }

@@ -10,7 +10,7 @@ use super::filter::Block;
 use super::mesh::MeshBvh;
 use super::stack::Stack;
 use super::tree::{CONSERVATIVE, Child, Node, Tree, WIDTH};
-use super::triangle::MeshRay;
+use super::triangle::QuickRay;
 
 /// A ray against the eight children of a node costs about as much as eight rays against one child.
 const CHUNK_COST: u32 = 1;
@@ -117,8 +117,8 @@ impl Blocker<'_> {
     /// The exact test of the triangle in a lane of a leaf.
     #[cold]
     #[inline(never)]
-    fn blocks(&self, ray: Option<MeshRay>, range: &Range<usize>, lane: usize) -> bool {
-        ray.is_some_and(|ray| self.bvh.exact_hit(&ray, range, lane, self.alpha).is_some())
+    fn blocks(&self, ray: &QuickRay, range: &Range<usize>, lane: usize) -> bool {
+        ray.exact().is_some_and(|ray| self.bvh.exact_hit(&ray, range, lane, self.alpha).is_some())
     }
 }
 
@@ -161,8 +161,8 @@ impl<S: Simd> Visitor<S> for Leaves<'_> {
         while rays != 0 {
             let lane = rays.trailing_zeros() as usize;
             rays &= rays - 1;
-            let ray = self.bundle.ray(lane);
-            if ray.is_some_and(|ray| self.blocker.bvh.any_hit(simd, node, &ray, self.blocker.alpha)) {
+            let ray = self.bundle.ray(lane, self.t_far);
+            if self.blocker.bvh.any_hit(simd, node, &ray, self.blocker.alpha) {
                 blocked |= 1 << lane;
             }
         }
@@ -172,14 +172,20 @@ impl<S: Simd> Visitor<S> for Leaves<'_> {
 
 /// The rays (bits by lane) among `rays` that the mesh blocks. The bundle must be prepared.
 #[inline(always)]
-pub(crate) fn trace_bundle<S: Simd>(simd: S, bundle: &Bundle, blocker: Blocker<'_>, rays: u64) -> u64 {
+pub(crate) fn trace_bundle<S: Simd>(
+    simd: S,
+    bundle: &Bundle,
+    reach: &Reach,
+    t_far: f32,
+    blocker: Blocker<'_>,
+    rays: u64,
+) -> u64 {
     let rays = rays & bundle.valid;
     let tree = &blocker.bvh.tree;
     if rays == 0 || tree.nodes.is_empty() {
         return 0;
     }
-    let (reach, t_far) = bundle.reach(simd, &blocker.bvh.bounds);
-    traverse(simd, bundle, &reach, t_far, tree, rays, &mut Leaves { bundle, blocker, t_far })
+    traverse(simd, bundle, reach, t_far, tree, rays, &mut Leaves { bundle, blocker, t_far })
 }
 
 /// Calls `visitor` with leaves and the rays (of `rays`) that may touch them; those that are blocked there go no further.
@@ -196,7 +202,7 @@ pub(crate) fn traverse<S: Simd, V: Visitor<S>>(
 ) -> u64 {
     let mut open = rays;
     // A node's index and 0, or a leaf's first primitive and their number.
-    let mut stack: Stack<(u32, u32, u64)> = Stack::new((0, 0, rays));
+    let mut stack: Stack<(u32, u32, u64), 48> = Stack::new((0, 0, rays));
     while let Some((index, count, rays)) = stack.pop() {
         let rays = rays & open;
         if rays == 0 {
@@ -305,11 +311,11 @@ fn trace_leaf<S: Simd>(
     let block = Block::new(simd, &rows, n, &bundle.origin, t_far, bundle.direction_max);
     let special = blocker.bvh.special_lanes(range);
     let exact = |lane: usize, mut triangles: u32| {
-        let ray = bundle.ray(lane);
+        let ray = bundle.ray(lane, t_far);
         while triangles != 0 {
             let triangle = triangles.trailing_zeros() as usize;
             triangles &= triangles - 1;
-            if blocker.blocks(ray, range, triangle) {
+            if blocker.blocks(&ray, range, triangle) {
                 return true;
             }
         }

@@ -28,6 +28,28 @@ pub(crate) struct MeshRay {
     pub(crate) t_max: f32,
 }
 
+/// What box tests and quick triangle tests need of a valid ray.
+#[derive(Clone, Copy)]
+pub(crate) struct QuickRay {
+    pub(crate) origin: [f32; 3],
+    pub(crate) direction: [f32; 3],
+    /// As in [`MeshRay`].
+    pub(crate) inverse: [f32; 3],
+    /// At least the largest coordinate of the direction.
+    pub(crate) direction_max: f32,
+    pub(crate) t_max: f32,
+    /// As far as it needs to go: finite, at most `t_max`.
+    pub(crate) t_far: f32,
+}
+
+impl QuickRay {
+    /// The ray for the exact test.
+    #[cold]
+    pub(crate) fn exact(&self) -> Option<MeshRay> {
+        MeshRay::new(Vec3::from_array(self.origin), Vec3::from_array(self.direction), self.t_max)
+    }
+}
+
 /// Where a ray meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TriangleHit {
