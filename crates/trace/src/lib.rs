@@ -15,4 +15,6 @@ pub mod sampling;
 #[cfg(test)]
 mod test_support;
 
-pub use bvh::{BlockedMask, Blockers, Hit, MAX_DIRECTIONS, Ray, Tracer, count_blocked, offset_origin};
+pub use bvh::{
+    BackFaces, BlockedMask, Blockers, Hit, MAX_DIRECTIONS, Ray, Tracer, Vectors, count_blocked, offset_origin,
+};

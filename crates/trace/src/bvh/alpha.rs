@@ -3,6 +3,17 @@
 use dapple_scene::glam::Vec2;
 use dapple_scene::{AlphaMode, Image, Material, Mesh, Scene, Texture};
 
+/// What rays do that meet the back of a triangle whose material is not double-sided.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BackFaces {
+    /// They are blocked, as at any front: what stands between a point and the sky shades it from either side. Points
+    /// inside of bodies are found by it.
+    #[default]
+    Block,
+    /// They pass, as for a viewer that does not draw backs.
+    PassSingleSided,
+}
+
 /// Marks a triangle that needs no alpha test.
 pub(crate) const OPAQUE: u32 = u32::MAX;
 /// Marks a triangle that is all hole.
@@ -36,6 +47,8 @@ pub(crate) struct MeshAlpha {
     /// For each triangle [`OPAQUE`], [`HOLE`] or an index into `tested`; empty if all are opaque.
     of_triangle: Vec<u32>,
     tested: Vec<AlphaTriangle>,
+    /// For each triangle whether rays pass it from behind; empty if none lets them.
+    one_sided: Vec<bool>,
 }
 
 #[derive(Clone, Debug)]
@@ -101,12 +114,23 @@ impl AlphaMaterial {
 }
 
 impl MeshAlpha {
-    pub(crate) fn new(scene: &Scene, mesh: &Mesh, materials: &AlphaMaterials) -> MeshAlpha {
+    pub(crate) fn new(
+        scene: &Scene,
+        mesh: &Mesh,
+        materials: &AlphaMaterials,
+        back_faces: BackFaces,
+    ) -> MeshAlpha {
+        let mut alpha = MeshAlpha::default();
+        let is_single = |m: u32| scene.materials.get(m as usize).is_some_and(|m| !m.double_sided);
+        if back_faces == BackFaces::PassSingleSided && mesh.parts.iter().any(|p| is_single(p.material)) {
+            alpha.one_sided =
+                (0..mesh.triangles.len()).map(|i| is_single(mesh.material_of(i as u32))).collect();
+        }
         let has_holes = |m: u32| materials.materials.get(m as usize).is_some_and(|m| m.cutoff.is_some());
         if !mesh.parts.iter().any(|p| has_holes(p.material)) {
-            return MeshAlpha::default();
+            return alpha;
         }
-        let mut alpha = MeshAlpha { of_triangle: vec![OPAQUE; mesh.triangles.len()], tested: Vec::new() };
+        alpha.of_triangle = vec![OPAQUE; mesh.triangles.len()];
         for part in mesh.parts.iter().filter(|p| has_holes(p.material)) {
             let first = (part.first_triangle as usize).min(mesh.triangles.len());
             let end = first.saturating_add(part.triangle_count as usize).min(mesh.triangles.len());
@@ -121,6 +145,16 @@ impl MeshAlpha {
     /// What the triangle of that index carries in [`super::triangle::Triangle::alpha`].
     pub(crate) fn of_triangle(&self, triangle: usize) -> u32 {
         self.of_triangle.get(triangle).copied().unwrap_or(OPAQUE)
+    }
+
+    /// Whether the triangle lets rays through from behind.
+    pub(crate) fn passes_back(&self, triangle: usize) -> bool {
+        self.one_sided.get(triangle).copied().unwrap_or(false)
+    }
+
+    /// Whether the triangle blocks whatever meets it.
+    pub(crate) fn is_plain(&self, triangle: usize) -> bool {
+        self.of_triangle(triangle) == OPAQUE && !self.passes_back(triangle)
     }
 
     fn classify(

@@ -30,7 +30,7 @@ pub(crate) struct Leaves {
 }
 
 /// Leaves of triangles: a block costs about the same however full it is.
-pub(crate) const MESH_LEAVES: Leaves = Leaves { max: MAX_LEAF, fixed: 1.0, each: 0.4 };
+pub(crate) const MESH_LEAVES: Leaves = Leaves { max: MAX_LEAF, fixed: 1.0, each: 0.05 };
 /// Leaves of instances: each is looked at by itself.
 pub(crate) const TOP_LEAVES: Leaves = Leaves { max: 1, fixed: 1.0, each: 1.0 };
 
@@ -268,11 +268,8 @@ fn collapse(binary: &[BinaryNode], leaves: &Leaves) -> Vec<Node> {
     for index in (0..binary.len()).rev() {
         let node = &binary[index];
         let (area, n) = (half_area(&node.bounds), node.count as usize);
-        let as_leaf = if n <= leaves.max {
-            area * (leaves.fixed + leaves.each * n as f64)
-        } else {
-            f64::INFINITY
-        };
+        let as_leaf =
+            if n <= leaves.max { area * (leaves.fixed + leaves.each * n as f64) } else { f64::INFINITY };
         if n == 1 {
             costs[index].forest = [as_leaf; WIDTH - 1];
             continue;

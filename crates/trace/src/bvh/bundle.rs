@@ -1,7 +1,7 @@
 //! Up to 64 rays from one point, side by side, and what all of them have in common.
 
-use dapple_scene::glam::Vec3;
 use dapple_scene::Aabb;
+use dapple_scene::glam::Vec3;
 use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x8};
 
 use super::placement::Placement;

@@ -43,11 +43,7 @@ pub(crate) struct Block<S: Simd> {
 
 #[inline(always)]
 fn cross<S: Simd>(a: &[f32x8<S>; 3], b: &[f32x8<S>; 3]) -> [f32x8<S>; 3] {
-    [
-        a[1].mul_sub(b[2], a[2] * b[1]),
-        a[2].mul_sub(b[0], a[0] * b[2]),
-        a[0].mul_sub(b[1], a[1] * b[0]),
-    ]
+    [a[1].mul_sub(b[2], a[2] * b[1]), a[2].mul_sub(b[0], a[0] * b[2]), a[0].mul_sub(b[1], a[1] * b[0])]
 }
 
 #[inline(always)]
@@ -103,7 +99,8 @@ impl<S: Simd> Block<S> {
         let volume_error = (edge2 * coordinate).mul_add(VOLUME_ERROR, (coordinate + 1.0) * UNDERFLOW);
         let mut edge_error = (both * direction_max).mul_add(EDGE_ERROR, UNDERFLOW * (1.0 + direction_max));
         let reach = coordinate + t_max * direction_max;
-        let reach_error = (edge2 * reach).mul_add(REACH_ERROR, UNDERFLOW * (1.0 + direction_max * (1.0 + t_max)));
+        let reach_error =
+            (edge2 * reach).mul_add(REACH_ERROR, UNDERFLOW * (1.0 + direction_max * (1.0 + t_max)));
         let mut sign = volume;
         let unsure = !volume.abs().simd_gt(volume_error).to_bitmask() as u32 & lanes;
         if unsure != 0 {
@@ -180,8 +177,8 @@ pub(crate) fn test_one<S: Simd>(simd: S, rows: &Rows<S>, lanes: u32, ray: &Quick
 
     let edge = largest(&ab).max(largest(&ac));
     let coordinate = largest(&at) + edge;
-    let edge_error = (coordinate * edge)
-        .mul_add(EDGE_ERROR * ray.direction_max, UNDERFLOW * (1.0 + ray.direction_max));
+    let edge_error =
+        (coordinate * edge).mul_add(EDGE_ERROR * ray.direction_max, UNDERFLOW * (1.0 + ray.direction_max));
     let reach = coordinate + ray.t_far * ray.direction_max;
     let reach_error =
         (edge * edge * reach).mul_add(REACH_ERROR, UNDERFLOW * (1.0 + ray.direction_max * (1.0 + ray.t_far)));

@@ -7,7 +7,7 @@ use dapple_scene::glam::Vec3;
 use dapple_scene::{Aabb, Mesh};
 use rayon::prelude::*;
 
-use super::alpha::{AlphaMaterials, HOLE, MeshAlpha, OPAQUE};
+use super::alpha::{AlphaMaterials, HOLE, MeshAlpha};
 use super::build::{MESH_LEAVES, build};
 use super::leaf::Triangles;
 use super::tree::Tree;
@@ -28,7 +28,7 @@ pub(crate) struct MeshBvh {
     pub(crate) bounds: Aabb,
     /// In leaf order.
     pub(crate) triangles: Triangles,
-    /// One bit a triangle in leaf order: not simply opaque. Empty if all are.
+    /// One bit a triangle in leaf order: has holes, or a side that rays pass. Empty if none has.
     special: Vec<u64>,
     alpha: Arc<MeshAlpha>,
     /// Cost when it was built.
@@ -40,13 +40,21 @@ fn corners(positions: &[Vec3], indices: [u32; 3]) -> [[f32; 3]; 3] {
     if corners.iter().all(|c| c.is_finite()) { corners.map(|c| c.to_array()) } else { [[f32::NAN; 3]; 3] }
 }
 
+/// Without margin.
 fn bounds_of(corners: &[[f32; 3]; 3]) -> Aabb {
     if corners[0][0].is_nan() {
         return Aabb::EMPTY;
     }
-    let b = Aabb::from_points(corners.map(Vec3::from_array));
+    Aabb::from_points(corners.map(Vec3::from_array))
+}
+
+/// Grown by the margin that the largest triangle inside can need, and by at least one step, however large the
+/// coordinates.
+fn with_margin(b: Aabb) -> Aabb {
+    if b.is_empty() {
+        return b;
+    }
     let margin = (b.max - b.min).max_element() * SIZE_MARGIN;
-    // At least one step outwards, however large the coordinates.
     let lower = |x: f32| (x - margin).next_down().max(-f32::MAX);
     let upper = |x: f32| (x + margin).next_up().min(f32::MAX);
     Aabb { min: b.min.map(lower), max: b.max.map(upper) }
@@ -57,25 +65,38 @@ impl MeshBvh {
     pub(crate) fn new(mesh: &Mesh, positions: &[Vec3], alpha: Arc<MeshAlpha>) -> MeshBvh {
         let kept: Vec<u32> =
             (0..mesh.triangles.len() as u32).filter(|&i| alpha.of_triangle(i as usize) != HOLE).collect();
-        let corners_of = |id: u32| corners(positions, mesh.triangles[id as usize]);
-        let boxes: Vec<Aabb> = kept.par_iter().map(|&id| bounds_of(&corners_of(id))).collect();
+        let boxes: Vec<Aabb> =
+            kept.par_iter().map(|&id| bounds_of(&corners(positions, mesh.triangles[id as usize]))).collect();
         let mut tree = build(&boxes, &MESH_LEAVES);
+        drop(boxes);
         let ids: Vec<u32> = std::mem::take(&mut tree.order).iter().map(|&i| kept[i as usize]).collect();
         let mut special = Vec::new();
-        if ids.iter().any(|&id| alpha.of_triangle(id as usize) != OPAQUE) {
+        if ids.iter().any(|&id| !alpha.is_plain(id as usize)) {
             special = vec![0_u64; ids.len().div_ceil(64) + 1];
-            for (i, _) in ids.iter().enumerate().filter(|(_, id)| alpha.of_triangle(**id as usize) != OPAQUE) {
+            for (i, _) in ids.iter().enumerate().filter(|(_, id)| !alpha.is_plain(**id as usize)) {
                 special[i / 64] |= 1 << (i % 64);
             }
         }
-        let mut triangles = Triangles::new(ids);
-        tree.for_each_leaf(|range| triangles.set_leaf(range, corners_of));
-        let (built_cost, bounds) = (tree.cost(), tree.bounds());
-        MeshBvh { tree, bounds, triangles, special, alpha, built_cost }
+        let triangles = Triangles::new(ids);
+        let mut bvh = MeshBvh { tree, bounds: Aabb::EMPTY, triangles, special, alpha, built_cost: 0.0 };
+        bvh.fit(mesh, positions);
+        bvh.built_cost = bvh.tree.cost();
+        bvh
     }
 
     /// Follows moved vertices of the same topology; `true` if the tree had to be built anew.
     pub(crate) fn update(&mut self, mesh: &Mesh, positions: &[Vec3]) -> bool {
+        self.fit(mesh, positions);
+        // A mesh that was a point or a line when it was built has cost 0, and is due for a better tree.
+        if self.tree.cost() <= REBUILD_COST_FACTOR * self.built_cost {
+            return false;
+        }
+        *self = MeshBvh::new(mesh, positions, Arc::clone(&self.alpha));
+        true
+    }
+
+    /// Sets all corners and all boxes.
+    fn fit(&mut self, mesh: &Mesh, positions: &[Vec3]) {
         let triangles = &mut self.triangles;
         self.tree.refit(|range| {
             let mut bounds = Aabb::EMPTY;
@@ -84,15 +105,9 @@ impl MeshBvh {
                 bounds = bounds.union(bounds_of(&corners));
                 corners
             });
-            bounds
+            with_margin(bounds)
         });
         self.bounds = self.tree.bounds();
-        // A mesh that was a point or a line when it was built has cost 0, and is due for a better tree.
-        if self.tree.cost() <= REBUILD_COST_FACTOR * self.built_cost {
-            return false;
-        }
-        *self = MeshBvh::new(mesh, positions, Arc::clone(&self.alpha));
-        true
     }
 
     /// Bytes held.
@@ -122,6 +137,9 @@ impl MeshBvh {
         let id = self.triangles.ids()[range.start + lane];
         let triangle = Triangle { corners: self.triangles.corners(range, lane) };
         let hit = intersect(ray, &triangle)?;
+        if hit.back_face && self.alpha.passes_back(id as usize) {
+            return None;
+        }
         alpha.blocks(&self.alpha, self.alpha.of_triangle(id as usize), hit.weights).then_some((id, hit))
     }
 }

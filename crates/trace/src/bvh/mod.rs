@@ -25,6 +25,7 @@ mod tracer;
 mod traverse;
 mod tree;
 mod triangle;
+mod vectors;
 
 #[cfg(test)]
 mod brute_force;
@@ -37,7 +38,9 @@ mod timing;
 
 use dapple_scene::glam::Vec3;
 
+pub use alpha::BackFaces;
 pub use tracer::{Blockers, Tracer};
+pub use vectors::Vectors;
 
 /// Most directions in one [`Tracer::occlusion`] query.
 pub const MAX_DIRECTIONS: usize = 256;

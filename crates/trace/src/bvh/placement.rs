@@ -3,10 +3,10 @@
 use dapple_scene::glam::{Mat3, Vec3};
 use dapple_scene::{Aabb, PosedInstance};
 
-use super::mesh::MeshBvh;
-use super::triangle::MeshRay;
-use super::tree::WIDTH;
 use super::Ray;
+use super::mesh::MeshBvh;
+use super::tree::WIDTH;
+use super::triangle::MeshRay;
 
 /// World boxes grow by this part of the numbers they were computed from: more than the rounding of the transform.
 const BOX_MARGIN: f32 = 1.0 / (1 << 20) as f32;
@@ -89,4 +89,3 @@ pub(crate) fn bounds_world(bvh: &MeshBvh, posed: &PosedInstance) -> Aabb {
     let limit = Vec3::splat(f32::MAX);
     Aabb { min: bounds.min.clamp(-limit, limit), max: bounds.max.clamp(-limit, limit) }
 }
-

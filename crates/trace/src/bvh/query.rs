@@ -175,7 +175,8 @@ impl<S: Simd> InstanceVisitor<S> for AnyInstance<'_> {
     #[inline(always)]
     fn visit(&mut self, simd: S, placed: &PlacedBvh, _: u32) -> Option<f32> {
         let ray = placed.placement.ray(self.ray);
-        self.blocked = ray.is_some_and(|ray| placed.bvh.any_hit(simd, 0, &placed.bvh.quick(&ray), self.alpha));
+        self.blocked =
+            ray.is_some_and(|ray| placed.bvh.any_hit(simd, 0, &placed.bvh.quick(&ray), self.alpha));
         if self.blocked { None } else { Some(self.ray.t_max) }
     }
 }

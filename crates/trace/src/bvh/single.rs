@@ -93,7 +93,13 @@ impl<F: FnMut(u32, TriangleHit)> Candidates for AllHits<'_, F> {
 impl MeshBvh {
     /// Whether anything in the subtree of the node `root` blocks the ray.
     #[inline(always)]
-    pub(crate) fn any_hit<S: Simd>(&self, simd: S, root: u32, ray: &QuickRay, alpha: &AlphaMaterials) -> bool {
+    pub(crate) fn any_hit<S: Simd>(
+        &self,
+        simd: S,
+        root: u32,
+        ray: &QuickRay,
+        alpha: &AlphaMaterials,
+    ) -> bool {
         let mut any = AnyHit { bvh: self, ray, alpha, blocked: false };
         self.visit_leaves(simd, root, ray, &mut any);
         any.blocked
@@ -132,7 +138,8 @@ impl MeshBvh {
     pub(crate) fn quick(&self, ray: &MeshRay) -> QuickRay {
         let mut extent = 0.0_f32;
         for axis in 0..3 {
-            let (lo, hi) = (self.bounds.min[axis] - ray.origin[axis], self.bounds.max[axis] - ray.origin[axis]);
+            let (lo, hi) =
+                (self.bounds.min[axis] - ray.origin[axis], self.bounds.max[axis] - ray.origin[axis]);
             extent = extent.max(lo.abs()).max(hi.abs());
         }
         QuickRay {
@@ -147,13 +154,7 @@ impl MeshBvh {
 
     /// Shows the leaves whose box the ray may touch to `candidates`, near ones mostly first.
     #[inline(always)]
-    fn visit_leaves<S: Simd>(
-        &self,
-        simd: S,
-        root: u32,
-        ray: &QuickRay,
-        candidates: &mut impl Candidates,
-    ) {
+    fn visit_leaves<S: Simd>(&self, simd: S, root: u32, ray: &QuickRay, candidates: &mut impl Candidates) {
         if self.tree.nodes.is_empty() {
             return;
         }

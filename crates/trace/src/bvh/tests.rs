@@ -4,7 +4,7 @@ use dapple_scene::glam::{Affine2, Affine3A, Mat3, Quat, Vec2, Vec3, Vec4};
 use dapple_scene::{AlphaMode, Filter, Image, Mesh, Pose, Scene, Texture, TextureRef, Wrap};
 
 use super::triangle::{MeshRay, Triangle, intersect};
-use super::{Ray, Tracer, count_blocked, offset_origin};
+use super::{BackFaces, Ray, Tracer, Vectors, count_blocked, offset_origin};
 use crate::test_support::{Random, cube, deform, joined, mesh, quad, scene, scene_of, soup, sphere};
 
 #[test]
@@ -336,4 +336,114 @@ fn spiteful_spacing_stays_shallow() {
     let ray =
         Ray { origin_world: Vec3::new(3.0, 0.01, 0.01), direction_world: Vec3::X, t_max: f32::INFINITY };
     assert!(tracer.occluded(&ray));
+}
+
+#[test]
+fn all_widths_give_the_same_answers() {
+    let widths = Vectors::all();
+    let names: Vec<String> = widths.iter().map(Vectors::name).collect();
+    println!("widths compared: {}", names.join(", "));
+    // Wherever this is built there is more than one, but for the plainest of machines.
+    assert!(!names.is_empty() && names.iter().all(|name| !name.is_empty()), "{names:?}");
+    let mut random = Random(17);
+    // Dense, with many near misses: a fan around one corner, a soup, and both far from the origin and huge.
+    for (offset, size) in [(0.0, 1.0), (1000.0, 1.0), (0.0, 1e12), (0.0, 1e-15)] {
+        let meshes = vec![soup(&mut random, 400, 0.3), sphere(Vec3::ZERO, 0.8, 12, 16)];
+        let place = |shift: Vec3| {
+            Affine3A::from_scale_rotation_translation(
+                Vec3::splat(size),
+                Quat::from_rotation_y(shift.x),
+                (shift + offset) * size,
+            )
+        };
+        let (scene, pose) = scene(meshes, &[(0, place(Vec3::ZERO)), (1, place(Vec3::splat(0.5)))]);
+        let tracer = Tracer::new(&scene, &pose);
+        let tracers: Vec<Tracer> = widths
+            .iter()
+            .map(|&width| {
+                let mut tracer = tracer.clone();
+                tracer.set_vectors(width);
+                tracer
+            })
+            .collect();
+        for _ in 0..60 {
+            let origin = (random.vector() + offset) * size;
+            let mut directions: Vec<Vec3> = (0..150).map(|_| random.direction()).collect();
+            // Through corners and along edges.
+            let corners = &scene.meshes[1].positions;
+            directions.extend((0..100).map(|i| {
+                let corner = place(Vec3::splat(0.5)).transform_point3(corners[i % corners.len()]);
+                (corner - origin).normalize_or(Vec3::X)
+            }));
+            let t_max = size * (0.1 + 3.0 * random.next());
+            let answer = tracers[0].occlusion(origin, &directions, t_max);
+            for (tracer, name) in tracers.iter().zip(&names) {
+                assert_eq!(tracer.occlusion(origin, &directions, t_max), answer, "{name}");
+            }
+            for (i, &direction_world) in directions.iter().enumerate() {
+                let ray = Ray { origin_world: origin, direction_world, t_max };
+                let hit = tracers[0].closest_hit(&ray);
+                assert_eq!(hit.is_some(), answer[i / 64] >> (i % 64) & 1 == 1);
+                for (tracer, name) in tracers.iter().zip(&names) {
+                    assert_eq!(tracer.closest_hit(&ray), hit, "{name}");
+                    assert_eq!(tracer.occluded(&ray), hit.is_some(), "{name}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn all_hits_come_in_order() {
+    let walls = (0..5).map(|i| {
+        let z = 1.0 + i as f32;
+        quad(
+            Vec3::new(-9.0, -9.0, z),
+            Vec3::new(9.0, -9.0, z),
+            Vec3::new(9.0, 9.0, z),
+            Vec3::new(-9.0, 9.0, z),
+        )
+    });
+    let (scene, pose) = scene(
+        vec![joined(walls), cube()],
+        &[(0, Affine3A::IDENTITY), (1, Affine3A::from_translation(Vec3::new(-0.5, -0.3, 2.2)))],
+    );
+    let tracer = Tracer::new(&scene, &pose);
+    let ray = Ray { origin_world: Vec3::new(0.1, 0.2, 0.0), direction_world: Vec3::Z, t_max: 4.5 };
+    let mut hits = vec![tracer.closest_hit(&ray).unwrap(); 3];
+    tracer.all_hits(&ray, &mut hits);
+    let found: Vec<(u32, f32)> = hits.iter().map(|h| (h.instance, h.t)).collect();
+    assert_eq!(found, [(0, 1.0), (0, 2.0), (1, 2.2), (0, 3.0), (1, 3.2), (0, 4.0)]);
+    assert_eq!(hits[0], tracer.closest_hit(&ray).unwrap());
+    tracer.all_hits(&Ray { t_max: 0.5, ..ray }, &mut hits);
+    assert!(hits.is_empty());
+}
+
+#[test]
+fn backs_of_single_sided_triangles_may_let_rays_through() {
+    let map = Affine3A::from_scale_rotation_translation(
+        Vec3::new(-1.0, 1.0, 1.0),
+        Quat::IDENTITY,
+        Vec3::new(3.0, 0.0, 0.0),
+    );
+    let (mut scene, pose) = scene(vec![cube()], &[(0, Affine3A::IDENTITY), (0, map)]);
+    let ask = |scene: &Scene, back_faces: BackFaces, origin_world: Vec3| {
+        let tracer = Tracer::with_back_faces(scene, &pose, back_faces);
+        let ray = Ray { origin_world, direction_world: Vec3::Y, t_max: 5.0 };
+        let blocked = tracer.occluded(&ray);
+        let mask = tracer.occlusion(origin_world, &[Vec3::Y; 70], 5.0);
+        assert_eq!(count_blocked(&mask), if blocked { 70 } else { 0 });
+        assert_eq!(tracer.closest_hit(&ray).is_some(), blocked);
+        blocked
+    };
+    // From inside and from below, also of the mirrored one.
+    for (x, z) in [(0.4, 0.3), (2.4, 0.3)] {
+        let (inside, below) = (Vec3::new(x, 0.5, z), Vec3::new(x, -0.5, z));
+        scene.materials[0].double_sided = false;
+        assert!(ask(&scene, BackFaces::Block, inside) && ask(&scene, BackFaces::Block, below));
+        assert!(!ask(&scene, BackFaces::PassSingleSided, inside));
+        assert!(ask(&scene, BackFaces::PassSingleSided, below));
+        scene.materials[0].double_sided = true;
+        assert!(ask(&scene, BackFaces::PassSingleSided, inside));
+    }
 }

@@ -7,7 +7,8 @@ use dapple_scene::{Aabb, Pose, PosedInstance, Scene};
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-use super::alpha::{AlphaMaterials, MeshAlpha};
+use super::Vectors;
+use super::alpha::{AlphaMaterials, BackFaces, MeshAlpha};
 use super::build::{TOP_LEAVES, build};
 use super::mesh::MeshBvh;
 use super::placement::{Placement, bounds_world};
@@ -22,6 +23,7 @@ use super::tree::Tree;
 pub struct Tracer {
     /// The widest vectors of this machine.
     pub(super) level: Level,
+    back_faces: BackFaces,
     pub(super) alpha: AlphaMaterials,
     mesh_alpha: Vec<Arc<MeshAlpha>>,
     /// Trees of meshes with rigid instances, parallel to the scene's meshes.
@@ -88,10 +90,17 @@ pub(super) struct PlacedBvh {
 impl Tracer {
     /// Builds all trees, in parallel in the caller's rayon pool.
     pub fn new(scene: &Scene, pose: &Pose) -> Tracer {
+        Tracer::with_back_faces(scene, pose, BackFaces::Block)
+    }
+
+    /// As [`Tracer::new`], saying what rays do at backs.
+    pub fn with_back_faces(scene: &Scene, pose: &Pose, back_faces: BackFaces) -> Tracer {
         let alpha = AlphaMaterials::new(scene);
-        let mesh_alpha = scene.meshes.iter().map(|m| Arc::new(MeshAlpha::new(scene, m, &alpha))).collect();
+        let mesh_alpha =
+            scene.meshes.iter().map(|m| Arc::new(MeshAlpha::new(scene, m, &alpha, back_faces))).collect();
         let mut tracer = Tracer {
             level: Level::new(),
+            back_faces,
             alpha,
             mesh_alpha,
             rigid: vec![None; scene.meshes.len()],
@@ -110,7 +119,7 @@ impl Tracer {
     /// has grown by half since they were built. Results are the same as those of a new tracer.
     pub fn update(&mut self, scene: &Scene, pose: &Pose) {
         if self.rigid.len() != scene.meshes.len() || self.instances.len() != scene.instances.len() {
-            *self = Tracer::new(scene, pose);
+            *self = Tracer::with_back_faces(scene, pose, self.back_faces);
         } else {
             self.place(scene, pose);
         }
@@ -216,6 +225,18 @@ impl Tracer {
         let given = movers.iter().copied().chain(std::iter::repeat(false));
         self.movers = given.take(self.instances.len()).collect();
         self.build_top();
+    }
+
+    /// Bytes of all trees and the triangles in them, each counted once however many instances share it.
+    pub fn bytes(&self) -> usize {
+        let rigid = self.rigid.iter().flatten().map(|bvh| bvh.bytes());
+        let deformed = self.instances.iter().flatten().filter(|p| p.deformed).map(|p| p.bvh.bytes());
+        rigid.chain(deformed).sum::<usize>() + self.still.tree.bytes() + self.moving.tree.bytes()
+    }
+
+    /// Uses these vectors from now on. All give the same answers.
+    pub fn set_vectors(&mut self, vectors: Vectors) {
+        self.level = vectors.0;
     }
 
     /// Which instances count as movers, parallel to the scene's instances.

@@ -114,17 +114,6 @@ impl Tree {
         }
     }
 
-    /// Calls `visit` with the range of each leaf.
-    pub(crate) fn for_each_leaf(&self, mut visit: impl FnMut(std::ops::Range<usize>)) {
-        for node in &self.nodes {
-            for slot in 0..WIDTH {
-                if let Child::Leaf(range) = node.child(slot) {
-                    visit(range);
-                }
-            }
-        }
-    }
-
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
         self.nodes.capacity() * size_of::<Node>() + self.order.capacity() * size_of::<u32>()
