@@ -19,9 +19,10 @@ use anyhow::{Result, bail};
 use clap::Parser;
 
 use builds::Built;
-use embree::{Device, Embree};
+use embree::{Device, Embree, SceneFlags};
 use measure::Measured;
 use rays::Batch;
+use scenes::Triangles;
 
 /// Rays a second of the tracer, side by side with others'.
 #[derive(Parser)]
@@ -52,6 +53,16 @@ struct Arguments {
     bench: bool,
 }
 
+impl Arguments {
+    fn flags(&self) -> SceneFlags {
+        if self.robust { SceneFlags::Robust } else { SceneFlags::Fastest }
+    }
+
+    fn build_repetitions(&self) -> usize {
+        if self.quick { 1 } else { 3 }
+    }
+}
+
 /// Rays of one length, as a part of the scene's diagonal.
 #[derive(Clone, Copy)]
 struct Length {
@@ -70,7 +81,7 @@ const LENGTHS: [Length; 2] = [
 /// The figures of one scene.
 struct SceneFigures {
     name: String,
-    triangles: usize,
+    mesh: Triangles,
     rays: usize,
     /// Parallel to [`LENGTHS`].
     lengths: Vec<(f32, Vec<Measured>)>,
@@ -105,6 +116,11 @@ fn main() -> Result<()> {
     }
     println!("moving scenes ...");
     let moving = moving::measure(if arguments.quick { 20 } else { 60 })?;
+    println!("building on all threads ...");
+    for scene in &mut figures {
+        let (flags, repetitions) = (arguments.flags(), arguments.build_repetitions());
+        builds::build_on_all_threads(&scene.mesh, embree.as_ref(), flags, repetitions, &mut scene.built)?;
+    }
 
     print::rays(&figures);
     print::disagreements(&figures);
@@ -139,11 +155,9 @@ fn measure_scene(
     if mesh.triangles.is_empty() {
         bail!("the scene {name} has no triangles");
     }
-    let triangles = mesh.triangles.len();
-    println!("{name}: {triangles} triangles, diagonal {:.2} m ...", mesh.bounds.diagonal());
+    println!("{name}: {} triangles, diagonal {:.2} m ...", mesh.triangles.len(), mesh.bounds.diagonal());
     let batch = Batch::new(&mesh, arguments.points);
-    let build_repetitions = if arguments.quick { 1 } else { 3 };
-    let (tracers, built) = builds::build(&mesh, embree, arguments.robust, build_repetitions)?;
+    let (tracers, built) = builds::build(&mesh, embree, arguments.flags(), arguments.build_repetitions())?;
     let candidates = tracers.candidates();
     let lengths = LENGTHS
         .iter()
@@ -153,5 +167,5 @@ fn measure_scene(
         })
         .collect();
     let rays = measure::ray_count(&batch);
-    Ok(Some(SceneFigures { name: name.to_owned(), triangles, rays, lengths, built }))
+    Ok(Some(SceneFigures { name: name.to_owned(), mesh, rays, lengths, built }))
 }
