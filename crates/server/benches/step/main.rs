@@ -8,6 +8,7 @@ mod clock;
 mod results;
 
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::Parser;
@@ -62,7 +63,17 @@ struct Step {
     bytes: usize,
 }
 
-fn main() -> Result<()> {
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<()> {
     // As a test (`cargo test --all-targets`) it has nothing to say.
     if !std::env::args().any(|a| ["--bench", "--help", "-h"].contains(&a.as_str())) {
         println!("skipped: a bench, run by `cargo bench -p dapple-server --bench step`");

@@ -142,7 +142,8 @@ impl Embree {
 fn library_file(path: &Path) -> Result<PathBuf> {
     if !path.is_dir() {
         if !path.exists() {
-            bail!("there is no file {} (Embree's library: --embree or EMBREE_LIB)", path.display());
+            let here = std::env::current_dir().unwrap_or_default();
+            bail!("there is no {} (Embree's library; seen from {})", path.display(), here.display());
         }
         // A name without a folder would be looked for in the system's folders.
         return path.canonicalize().with_context(|| format!("cannot find {}", path.display()));

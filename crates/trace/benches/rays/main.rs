@@ -13,6 +13,7 @@ mod scenes;
 mod tracers;
 
 use std::path::PathBuf;
+use std::process::ExitCode;
 use std::sync::Arc;
 
 use anyhow::{Result, bail};
@@ -39,7 +40,8 @@ struct Arguments {
     /// A quarter of the points and three rounds.
     #[arg(long)]
     quick: bool,
-    /// Embree's library, or a folder that holds it; otherwise the environment's EMBREE_LIB says.
+    /// Embree's library, or a folder that holds it; otherwise the environment's EMBREE_LIB says. Cargo starts benches
+    /// in their package's folder, so give whole paths.
     #[arg(long)]
     embree: Option<PathBuf>,
     /// Builds Embree's scenes with its robust flag: fewer disagreements, slower.
@@ -88,7 +90,17 @@ struct SceneFigures {
     built: Vec<Built>,
 }
 
-fn main() -> Result<()> {
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<()> {
     // As a test (`cargo test --all-targets`) it has nothing to say.
     if !std::env::args().any(|a| ["--bench", "--help", "-h"].contains(&a.as_str())) {
         println!("skipped: a bench, run by `cargo bench -p dapple-trace --bench rays`");
