@@ -25,9 +25,12 @@ test:
 	@bash scripts/setup.sh test
 	cargo xtask ci
 
-# What looking visibility up costs on this machine's adapter: target/bench.json.
+# Rays a second beside other tracers (EMBREE_LIB: crates/trace/benches/rays/README.md), what a step of the server costs,
+# and what looking visibility up costs on this machine's adapter: target/bench.json.
 bench:
 	@bash scripts/setup.sh
+	cargo bench --package dapple-trace --bench rays
+	cargo bench --package dapple-server --bench step
 	cargo bench --package dapple --bench lookup
 
 check:

@@ -7,6 +7,8 @@ mod cpu;
 #[path = "../../tests/common/fullscreen.rs"]
 mod fullscreen;
 mod passes;
+#[path = "../../../../crates/trace/benches/rays/results.rs"]
+mod results;
 mod view;
 
 use std::sync::Arc;
@@ -47,7 +49,7 @@ struct Arguments {
     #[arg(long, default_value_t = 0.5)]
     detail: f32,
     /// Where the figures are written.
-    #[arg(long, default_value = concat!(env!("CARGO_MANIFEST_DIR"), "/../../target/bench.json"))]
+    #[arg(long, default_value = results::FILE)]
     out: std::path::PathBuf,
     /// Processor only.
     #[arg(long)]
@@ -88,7 +90,7 @@ fn main() -> Result<()> {
             processor = cpu::measure(&seen.scene, &store, arguments.rounds);
         }
     }
-    let results = json!({
+    let section = json!({
         "schema": 1,
         "adapter": gpu.as_ref().map(Gpu::description),
         "software": software,
@@ -98,14 +100,7 @@ fn main() -> Result<()> {
         "costs": costs,
         "processor": processor,
     });
-    if let Some(folder) = arguments.out.parent() {
-        std::fs::create_dir_all(folder)?;
-    }
-    std::fs::write(&arguments.out, serde_json::to_vec_pretty(&results)?)
-        .with_context(|| format!("cannot write {}", arguments.out.display()))?;
-    let shown = std::fs::canonicalize(&arguments.out).unwrap_or(arguments.out);
-    println!("\nwritten to {}", shown.display());
-    Ok(())
+    results::merge(&arguments.out, "lookup", section)
 }
 
 /// The adapter, or none after saying so aloud.

@@ -13,7 +13,7 @@ use parry3d::math::Vector;
 use parry3d::shape::TriMesh;
 
 use crate::clock::{Took, median, time_process};
-use crate::embree::{self, Device, Embree, Geometry, Quality};
+use crate::embree::{self, Device, Embree, Geometry, Quality, SceneFlags};
 use crate::scenes::Triangles;
 use crate::tracers::{self, Candidate};
 
@@ -47,83 +47,99 @@ impl Tracers {
     }
 }
 
-/// Builds everything, ours and Embree's `repetitions` times.
+/// Builders that can use all threads.
+const QUALITIES: [(Quality, &str); 2] = [(Quality::Medium, "Embree medium"), (Quality::High, "Embree high")];
+const OURS: &str = "ours";
+
+/// Builds everything on one thread, ours and Embree's `repetitions` times.
 pub(crate) fn build(
     mesh: &Triangles,
     embree: Option<&Arc<Embree>>,
-    robust: bool,
+    flags: SceneFlags,
     repetitions: usize,
 ) -> Result<(Tracers, Vec<Built>)> {
-    let (ours, built) = build_ours(mesh, repetitions)?;
-    let mut table = vec![built];
+    let mut table = Vec::new();
+    let mut note = |name, one_thread, bytes, most_bytes| {
+        table.push(Built { name, one_thread, all_threads: None, bytes, most_bytes });
+    };
+    let (ours, took) = build_ours(mesh, 1, repetitions)?;
+    note(OURS, took, our_bytes(&ours), None);
+
     let mut scenes = Vec::new();
     if let Some(embree) = embree {
         let geometry = Geometry::new(&mesh.positions, &mesh.triangles)?;
-        for (quality, name) in [(Quality::Medium, "Embree medium"), (Quality::High, "Embree high")] {
-            const ROBUST: i32 = 1 << 2;
-            let flags = if robust { ROBUST } else { 0 };
-            let run = |threads: usize| {
-                repeat(repetitions, || {
-                    // A device for each, so that its memory is that of one scene; making it is not timed.
-                    let device = Device::new(embree, threads)?;
-                    let (scene, took) =
-                        time_process(|| embree::Scene::new(&device, &geometry, quality, flags));
-                    Ok((scene?, took))
-                })
-            };
-            let all_threads = run(0)?.1;
-            let (scene, one_thread) = run(1)?;
+        for (quality, name) in QUALITIES {
+            let (scene, took) = build_embree(embree, &geometry, quality, flags, 1, repetitions)?;
             let (bytes, most_bytes) = scene.memory();
-            table.push(Built {
-                name,
-                one_thread,
-                all_threads: Some(all_threads),
-                bytes: Some(bytes),
-                most_bytes: Some(most_bytes),
-            });
+            note(name, took, Some(bytes), Some(most_bytes));
             scenes.push((quality, scene));
         }
     }
 
-    let only =
-        |name, one_thread, bytes| Built { name, one_thread, all_threads: None, bytes, most_bytes: None };
-    let corners = |t: &[u32; 3]| t.map(|i| mesh.positions[i as usize].into());
-    let triangles = mesh.triangles.iter().map(|t| {
-        let [v0, v1, v2] = corners(t);
-        Triangle { v0, v1, v2 }
-    });
-    let triangles: Vec<Triangle> = triangles.collect();
+    let triangles: Vec<Triangle> = mesh
+        .triangles
+        .iter()
+        .map(|t| {
+            let [v0, v1, v2] = t.map(|i| mesh.positions[i as usize].into());
+            Triangle { v0, v1, v2 }
+        })
+        .collect();
     let (tree, took) = time_process(|| {
         build_cwbvh_from_tris(&triangles, BvhBuildParams::slow_build(), &mut Duration::default())
     });
-    let bytes = size_of_val(&*tree.nodes)
-        + size_of_val(&*tree.primitive_indices)
-        + triangles.len() * size_of::<Triangle>();
-    table.push(only("obvhs slow", took, Some(bytes)));
+    let bytes = size_of_val(&*tree.nodes) + size_of_val(&*tree.primitive_indices) + size_of_val(&*triangles);
+    note("obvhs slow", took, Some(bytes), None);
 
     let vertices = mesh.positions.iter().map(|p| Vector::new(p.x, p.y, p.z)).collect();
     let (parry, took) = time_process(|| TriMesh::new(vertices, mesh.triangles.clone()));
-    table.push(only("parry", took, None));
+    note("parry", took, None, None);
     let parry = parry.context("parry refuses the mesh")?;
     Ok((Tracers { ours, embree: scenes, obvhs: (tree, triangles), parry }, table))
 }
 
-fn build_ours(mesh: &Triangles, repetitions: usize) -> Result<(Tracer, Built)> {
+/// Builds again, on all threads, what can, and notes what that took.
+///
+/// After everything else: Embree's other threads stay, and spin beside whatever is measured later.
+pub(crate) fn build_on_all_threads(
+    mesh: &Triangles,
+    embree: Option<&Arc<Embree>>,
+    flags: SceneFlags,
+    repetitions: usize,
+    table: &mut [Built],
+) -> Result<()> {
+    let mut note = |name, took| {
+        table.iter_mut().filter(|built| built.name == name).for_each(|built| built.all_threads = Some(took));
+    };
+    note(OURS, build_ours(mesh, 0, repetitions)?.1);
+    if let Some(embree) = embree {
+        let geometry = Geometry::new(&mesh.positions, &mesh.triangles)?;
+        for (quality, name) in QUALITIES {
+            note(name, build_embree(embree, &geometry, quality, flags, 1, repetitions)?.1);
+        }
+    }
+    Ok(())
+}
+
+fn build_ours(mesh: &Triangles, threads: usize, repetitions: usize) -> Result<(Tracer, Took)> {
     let (scene, pose) = mesh.scene();
-    let run = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
-        repeat(repetitions, || Ok(time_process(|| pool.install(|| Tracer::new(&scene, &pose)))))
-    };
-    let all_threads = run(0)?.1;
-    let (tracer, one_thread) = run(1)?;
-    let built = Built {
-        name: "ours",
-        one_thread,
-        all_threads: Some(all_threads),
-        bytes: our_bytes(&tracer),
-        most_bytes: None,
-    };
-    Ok((tracer, built))
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+    repeat(repetitions, || Ok(time_process(|| pool.install(|| Tracer::new(&scene, &pose)))))
+}
+
+fn build_embree(
+    embree: &Arc<Embree>,
+    geometry: &Arc<Geometry>,
+    quality: Quality,
+    flags: SceneFlags,
+    threads: usize,
+    repetitions: usize,
+) -> Result<(embree::Scene, Took)> {
+    repeat(repetitions, || {
+        // A device for each, so that its memory is that of one scene; making it is not timed.
+        let device = Device::new(embree, threads)?;
+        let (scene, took) = time_process(|| embree::Scene::new(&device, geometry, quality, flags));
+        Ok((scene?, took))
+    })
 }
 
 // MEMORY OF OUR TRACER: as soon as there is `Tracer::bytes()`, this is `Some(tracer.bytes())`; the table then shows

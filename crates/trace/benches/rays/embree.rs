@@ -98,6 +98,7 @@ functions! {
     set_quality = b"rtcSetSceneBuildQuality\0": unsafe extern "C" fn(Handle, c_int),
     set_flags = b"rtcSetSceneFlags\0": unsafe extern "C" fn(Handle, c_int),
     commit_scene = b"rtcCommitScene\0": unsafe extern "C" fn(Handle),
+    join_commit_scene = b"rtcJoinCommitScene\0": unsafe extern "C" fn(Handle),
     new_geometry = b"rtcNewGeometry\0": unsafe extern "C" fn(Handle, c_int) -> Handle,
     release_geometry = b"rtcReleaseGeometry\0": unsafe extern "C" fn(Handle),
     set_buffer = b"rtcSetSharedGeometryBuffer\0":
@@ -141,7 +142,8 @@ impl Embree {
 fn library_file(path: &Path) -> Result<PathBuf> {
     if !path.is_dir() {
         if !path.exists() {
-            bail!("there is no file {} (Embree's library: --embree or EMBREE_LIB)", path.display());
+            let here = std::env::current_dir().unwrap_or_default();
+            bail!("there is no {} (Embree's library; seen from {})", path.display(), here.display());
         }
         // A name without a folder would be looked for in the system's folders.
         return path.canonicalize().with_context(|| format!("cannot find {}", path.display()));
@@ -181,6 +183,8 @@ unsafe extern "C" fn count_memory(memory: *mut c_void, bytes: isize, _post: bool
 pub(crate) struct Device {
     embree: Arc<Embree>,
     handle: Handle,
+    /// Whether one thread builds.
+    alone: bool,
     memory: Box<Memory>,
 }
 
@@ -201,8 +205,9 @@ impl Device {
             let error = unsafe { (functions.device_error)(handle) };
             bail!("Embree makes no device here: {}", error_name(error));
         }
-        let device = Device { embree: Arc::clone(embree), handle, memory: Box::default() };
-        let memory: *const Memory = &*device.memory;
+        let (embree, alone) = (Arc::clone(embree), threads == 1);
+        let device = Device { embree, handle, alone, memory: Box::default() };
+        let (memory, functions): (*const Memory, _) = (&*device.memory, &device.embree.functions);
         // SAFETY: the counters are boxed and live as long as the device, which its drop releases first.
         unsafe { (functions.monitor_memory)(handle, count_memory, memory.cast_mut().cast()) };
         Ok(Arc::new(device))
@@ -254,6 +259,13 @@ pub(crate) enum Quality {
     High = 2,
 }
 
+/// `RTCSceneFlags`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum SceneFlags {
+    Fastest = 0,
+    Robust = 1 << 2,
+}
+
 /// What Embree reads while it builds.
 pub(crate) struct Geometry {
     /// One more than there are, because Embree reads 16 bytes at each.
@@ -284,12 +296,12 @@ unsafe impl Send for Scene {}
 unsafe impl Sync for Scene {}
 
 impl Scene {
-    /// Builds: everything that counts as Embree's building time. `flags` are `RTCSceneFlags`; 0 is the fastest.
+    /// Builds: everything that counts as Embree's building time.
     pub(crate) fn new(
         device: &Arc<Device>,
         geometry: &Arc<Geometry>,
         quality: Quality,
-        flags: i32,
+        flags: SceneFlags,
     ) -> Result<Scene> {
         let f = &device.embree.functions;
         // SAFETY: handles are used in their lifetimes; buffers are as long as is said here and are kept by the scene.
@@ -298,25 +310,20 @@ impl Scene {
             device.check("making a scene")?;
             let scene = Scene { device: Arc::clone(device), handle, _geometry: Arc::clone(geometry) };
             (f.set_quality)(handle, quality as c_int);
-            (f.set_flags)(handle, flags);
+            (f.set_flags)(handle, flags as c_int);
             let mesh = (f.new_geometry)(device.handle, GEOMETRY_TRIANGLE);
+            let buffer = |kind, format, at, items| {
+                (f.set_buffer)(mesh, kind, 0, format, at, 0, size_of::<[f32; 3]>(), items);
+            };
             let (vertices, triangles) = (&geometry.vertices, &geometry.triangles);
-            let (at, count) = (vertices.as_ptr().cast(), vertices.len() - 1);
-            (f.set_buffer)(mesh, BUFFER_VERTEX, 0, FORMAT_FLOAT3, at, 0, 12, count);
-            (f.set_buffer)(
-                mesh,
-                BUFFER_INDEX,
-                0,
-                FORMAT_UINT3,
-                triangles.as_ptr().cast(),
-                0,
-                12,
-                triangles.len(),
-            );
+            buffer(BUFFER_VERTEX, FORMAT_FLOAT3, vertices.as_ptr().cast(), vertices.len() - 1);
+            buffer(BUFFER_INDEX, FORMAT_UINT3, triangles.as_ptr().cast(), triangles.len());
             (f.commit_geometry)(mesh);
             (f.attach_geometry)(handle, mesh);
             (f.release_geometry)(mesh);
-            (f.commit_scene)(handle);
+            // Where one thread is to build, it does so itself: Embree's own way is a task of its scheduler, one of whose
+            // threads then spins on, next to whatever is measured later.
+            (if device.alone { f.join_commit_scene } else { f.commit_scene })(handle);
             device.check("building")?;
             Ok(scene)
         }

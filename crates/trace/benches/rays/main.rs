@@ -13,15 +13,17 @@ mod scenes;
 mod tracers;
 
 use std::path::PathBuf;
+use std::process::ExitCode;
 use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use clap::Parser;
 
 use builds::Built;
-use embree::{Device, Embree};
+use embree::{Device, Embree, SceneFlags};
 use measure::Measured;
 use rays::Batch;
+use scenes::Triangles;
 
 /// Rays a second of the tracer, side by side with others'.
 #[derive(Parser)]
@@ -38,7 +40,8 @@ struct Arguments {
     /// A quarter of the points and three rounds.
     #[arg(long)]
     quick: bool,
-    /// Embree's library, or a folder that holds it; otherwise the environment's EMBREE_LIB says.
+    /// Embree's library, or a folder that holds it; otherwise the environment's EMBREE_LIB says. Cargo starts benches
+    /// in their package's folder, so give whole paths.
     #[arg(long)]
     embree: Option<PathBuf>,
     /// Builds Embree's scenes with its robust flag: fewer disagreements, slower.
@@ -50,6 +53,16 @@ struct Arguments {
     /// Given by cargo.
     #[arg(long, hide = true)]
     bench: bool,
+}
+
+impl Arguments {
+    fn flags(&self) -> SceneFlags {
+        if self.robust { SceneFlags::Robust } else { SceneFlags::Fastest }
+    }
+
+    fn build_repetitions(&self) -> usize {
+        if self.quick { 1 } else { 3 }
+    }
 }
 
 /// Rays of one length, as a part of the scene's diagonal.
@@ -70,14 +83,24 @@ const LENGTHS: [Length; 2] = [
 /// The figures of one scene.
 struct SceneFigures {
     name: String,
-    triangles: usize,
+    mesh: Triangles,
     rays: usize,
     /// Parallel to [`LENGTHS`].
     lengths: Vec<(f32, Vec<Measured>)>,
     built: Vec<Built>,
 }
 
-fn main() -> Result<()> {
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<()> {
     // As a test (`cargo test --all-targets`) it has nothing to say.
     if !std::env::args().any(|a| ["--bench", "--help", "-h"].contains(&a.as_str())) {
         println!("skipped: a bench, run by `cargo bench -p dapple-trace --bench rays`");
@@ -105,6 +128,11 @@ fn main() -> Result<()> {
     }
     println!("moving scenes ...");
     let moving = moving::measure(if arguments.quick { 20 } else { 60 })?;
+    println!("building on all threads ...");
+    for scene in &mut figures {
+        let (flags, repetitions) = (arguments.flags(), arguments.build_repetitions());
+        builds::build_on_all_threads(&scene.mesh, embree.as_ref(), flags, repetitions, &mut scene.built)?;
+    }
 
     print::rays(&figures);
     print::disagreements(&figures);
@@ -139,11 +167,9 @@ fn measure_scene(
     if mesh.triangles.is_empty() {
         bail!("the scene {name} has no triangles");
     }
-    let triangles = mesh.triangles.len();
-    println!("{name}: {triangles} triangles, diagonal {:.2} m ...", mesh.bounds.diagonal());
+    println!("{name}: {} triangles, diagonal {:.2} m ...", mesh.triangles.len(), mesh.bounds.diagonal());
     let batch = Batch::new(&mesh, arguments.points);
-    let build_repetitions = if arguments.quick { 1 } else { 3 };
-    let (tracers, built) = builds::build(&mesh, embree, arguments.robust, build_repetitions)?;
+    let (tracers, built) = builds::build(&mesh, embree, arguments.flags(), arguments.build_repetitions())?;
     let candidates = tracers.candidates();
     let lengths = LENGTHS
         .iter()
@@ -153,5 +179,5 @@ fn measure_scene(
         })
         .collect();
     let rays = measure::ray_count(&batch);
-    Ok(Some(SceneFigures { name: name.to_owned(), triangles, rays, lengths, built }))
+    Ok(Some(SceneFigures { name: name.to_owned(), mesh, rays, lengths, built }))
 }

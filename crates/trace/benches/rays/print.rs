@@ -125,14 +125,14 @@ pub(crate) fn builds(figures: &[SceneFigures]) {
     );
     let ms = |t: Option<Took>, pick: fn(&Took) -> f64| dash(t.map(|t| format!("{:.1}", pick(&t) * 1e3)));
     for scene in figures {
+        let triangles = scene.mesh.triangles.len();
         for b in &scene.built {
-            let per_triangle = |bytes: Option<usize>| {
-                dash(bytes.map(|b| format!("{:.1}", b as f64 / scene.triangles as f64)))
-            };
+            let per_triangle =
+                |bytes: Option<usize>| dash(bytes.map(|b| format!("{:.1}", b as f64 / triangles as f64)));
             println!(
                 "{:<10}{:>10}  {:<14}{:>12}{:>12}{:>14}{:>14}{:>11}{:>11}",
                 scene.name,
-                scene.triangles,
+                triangles,
                 b.name,
                 ms(Some(b.one_thread), |t| t.wall_s),
                 ms(Some(b.one_thread), |t| t.cpu_s),
@@ -219,7 +219,7 @@ fn scene_json(scene: &SceneFigures) -> Value {
         })
         .collect();
     json!({
-        "scene": scene.name, "triangles": scene.triangles, "rays": scene.rays,
+        "scene": scene.name, "triangles": scene.mesh.triangles.len(), "rays": scene.rays,
         "lengths": lengths, "built": built,
     })
 }
