@@ -9,8 +9,10 @@
 mod atrium;
 pub mod builder;
 pub mod noise;
+mod paint;
 pub mod path;
 pub mod physics;
+mod profile;
 pub mod shapes;
 
 /// A scene that the library can make.
