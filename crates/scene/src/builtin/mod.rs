@@ -8,6 +8,8 @@
 
 mod atrium;
 pub mod builder;
+mod kit;
+mod lab;
 pub mod noise;
 mod paint;
 pub mod path;
@@ -25,11 +27,18 @@ pub struct Builtin {
 }
 
 /// All built-in scenes.
-pub const BUILTINS: &[Builtin] = &[Builtin {
-    name: "atrium",
-    summary: "A two-storey hall with arcades, stairs, curtains and railings, where boulders roll and spot lights sweep \
-              (15 s; camera paths path-walk and path-gallery).",
-}];
+pub const BUILTINS: &[Builtin] = &[
+    Builtin {
+        name: "atrium",
+        summary: "A two-storey hall with arcades, stairs, curtains and railings, where boulders roll and spot lights sweep \
+                  (15 s; camera paths path-walk and path-gallery).",
+    },
+    Builtin {
+        name: "lab",
+        summary: "A laboratory with machines, benches, pipes and a platform, through which 23 skinned people walk \
+                  (15 s; camera paths path-aisle and path-crane).",
+    },
+];
 
 /// Why a built-in scene could not be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -71,6 +80,7 @@ pub fn glb(name: &str, detail: f32) -> Result<Vec<u8>, BuiltinError> {
     }
     match name {
         "atrium" => atrium::glb(Detail(detail)),
+        "lab" => lab::glb(Detail(detail)),
         _ => Err(BuiltinError::Unknown {
             name: name.into(),
             known: BUILTINS.iter().map(|b| b.name).collect::<Vec<_>>().join(", "),
