@@ -68,7 +68,7 @@ impl<S: Copy + PartialEq> Kit<S> {
 
     /// A pipe along points whose corners are bent with a radius.
     pub(super) fn pipe(&mut self, of: S, points: &[Vec3], radius: f32, bend: f32, sides: u32) {
-        let pieces = self.detail.facets(6, 2);
+        let pieces = self.detail.facets(5, 2);
         self.bar(of, &bent(points, bend, pieces), radius, sides);
     }
 
@@ -88,7 +88,7 @@ impl<S: Copy + PartialEq> Kit<S> {
     /// A turned piece with a rounded outline.
     pub(super) fn round(&mut self, of: S, at: Vec3, profile: &[[f32; 2]], segments: u32) {
         let profile: Vec<Vec2> = profile.iter().map(|&[r, y]| v2(r, y)).collect();
-        let profile = rounded(&profile, self.detail.facets(5, 2));
+        let profile = rounded(&profile, self.detail.facets(2, 2));
         let piece = turned(self.detail, &profile, self.detail.facets(segments, 6));
         self.at(of, &piece, at);
     }
@@ -97,7 +97,7 @@ impl<S: Copy + PartialEq> Kit<S> {
     pub(super) fn flange(&mut self, of: S, at: Vec3, axis: Vec3, radius: f32) {
         let half = 0.18 * radius;
         let rim = [[1.35 * radius, -half], [1.35 * radius, half]];
-        self.turned_along(of, at, axis, &rim, 18);
+        self.turned_along(of, at, axis, &rim, 14);
     }
 
     /// The mesh of all pieces; `material` tells what each is made of.

@@ -16,6 +16,7 @@ pub mod path;
 pub mod physics;
 mod profile;
 pub mod shapes;
+mod station;
 
 /// A scene that the library can make.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,6 +33,11 @@ pub const BUILTINS: &[Builtin] = &[
         name: "atrium",
         summary: "A two-storey hall with arcades, stairs, curtains and railings, where boulders roll and spot lights sweep \
                   (15 s; camera paths path-walk and path-gallery).",
+    },
+    Builtin {
+        name: "station",
+        summary: "A space station of large panels, thin struts and pipes, almost still, past which 14 rocks drift \
+                  (15 s; camera paths path-deck and path-orbit).",
     },
     Builtin {
         name: "lab",
@@ -80,6 +86,7 @@ pub fn glb(name: &str, detail: f32) -> Result<Vec<u8>, BuiltinError> {
     }
     match name {
         "atrium" => atrium::glb(Detail(detail)),
+        "station" => station::glb(Detail(detail)),
         "lab" => lab::glb(Detail(detail)),
         _ => Err(BuiltinError::Unknown {
             name: name.into(),

@@ -157,7 +157,7 @@ pub(super) fn services(detail: Detail) -> Things {
     let mut k: Things = Kit::new(detail);
     let (x, z) = (ROOM.x, ROOM.y);
     for (line, radius, height) in [(-3.0, 0.30, 4.95), (1.75, 0.24, 5.0)] {
-        k.bar(Steel, &[p(-x, height, line), p(x, height, line)], radius, 36);
+        k.bar(Steel, &[p(-x, height, line), p(x, height, line)], radius, 28);
         for i in 0..14 {
             let at = -13.0 + 2.0 * i as f32;
             k.turned_along(
@@ -165,11 +165,11 @@ pub(super) fn services(detail: Detail) -> Things {
                 p(at, height, line),
                 Vec3::X,
                 &[[radius, -0.03], [radius + 0.025, -0.02], [radius + 0.025, 0.02], [radius, 0.03]],
-                36,
+                16,
             );
             if i % 2 == 0 {
                 let mouth = [[0.13, 0.0], [0.15, 0.03], [0.15, 0.25]];
-                k.turned(Enamel, p(at + 1.0, height - radius - 0.2, line), &mouth, 24);
+                k.turned(Enamel, p(at + 1.0, height - radius - 0.2, line), &mouth, 16);
             }
             k.bar(DarkSteel, &[p(at, height, line), p(at, CEILING, line)], 0.012, 6);
         }
@@ -186,13 +186,13 @@ pub(super) fn services(detail: Detail) -> Things {
         }
         for (cable, offset) in [(Rubber, -0.12), (Blue, -0.06), (Rubber, 0.0), (Orange, 0.07), (Rubber, 0.13)]
         {
-            let points: Vec<Vec3> = (0..=40)
+            let points: Vec<Vec3> = (0..=18)
                 .map(|i| {
                     let sway = 0.02 * libm::sinf(1.7 * i as f32 + 40.0 * offset);
-                    p(-x + 0.7 * i as f32, y + 0.052, line + offset + sway)
+                    p(-x + 28.0 / 18.0 * i as f32, y + 0.052, line + offset + sway)
                 })
                 .collect();
-            k.bar(cable, &points, 0.020, 8);
+            k.bar(cable, &points, 0.020, 5);
         }
     }
     // Pipes along the north and west walls, with joints and brackets.

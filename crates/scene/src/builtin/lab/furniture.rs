@@ -30,7 +30,7 @@ fn bench(detail: Detail) -> Things {
         k.block(Blue, [0.15, y, 0.322], [0.75, y + 0.165, 0.342], 0.004);
         let grip = [[0.33, 0.335], [0.33, 0.37], [0.57, 0.37], [0.57, 0.335]];
         let grip: Vec<Vec3> = grip.iter().map(|&[x, z]| Vec3::new(x, y + 0.11, z)).collect();
-        k.pipe(Steel, &grip, 0.006, 0.02, 6);
+        k.pipe(Steel, &grip, 0.006, 0.02, 5);
     }
     k
 }
@@ -42,12 +42,10 @@ pub(super) fn glass_bench(detail: Detail) -> Things {
         k.bar(Steel, &[Vec3::new(x, 0.89, -0.34), Vec3::new(x, 1.5, -0.34)], 0.014, 8);
     }
     k.block(Glass, [-0.9, 1.28, -0.40], [0.9, 1.295, -0.20], 0.003);
-    for i in 0..7 {
-        bottle(&mut k, Vec3::new(-0.78 + 0.25 * i as f32, 1.294, -0.30), 0.75, i);
+    for i in 0..5 {
+        bottle(&mut k, Vec3::new(-0.75 + 0.37 * i as f32, 1.294, -0.30), 0.75, i);
     }
-    for (i, x) in [-0.66, -0.28].into_iter().enumerate() {
-        tube_rack(&mut k, Vec3::new(x, 0.899, 0.12 - 0.14 * i as f32), i as u32);
-    }
+    tube_rack(&mut k, Vec3::new(-0.5, 0.899, 0.06), 0);
     for (i, (x, z, size)) in [(0.1, 0.1, 1.0), (0.28, -0.05, 0.8), (0.15, -0.18, 0.7)].into_iter().enumerate()
     {
         flask(&mut k, Vec3::new(x, 0.899, z), size, [RedLiquid, GreenLiquid, BlueLiquid][i]);
@@ -66,10 +64,10 @@ pub(super) fn screen_bench(detail: Detail) -> Things {
         screen.block(Rubber, [-0.29, 0.14, -0.01], [0.29, 0.50, 0.022], 0.006);
         screen.plain(Screen, [-0.275, 0.155, 0.015], [0.275, 0.485, 0.024]);
         screen.block(Rubber, [-0.21, 0.0, 0.16], [0.21, 0.016, 0.30], 0.004);
-        for row in 0..detail.count(4, 1) {
-            for key in 0..detail.count(13, 4) {
-                let (x, z) = (-0.195 + 0.03 * key as f32, 0.172 + 0.03 * row as f32);
-                screen.plain(Enamel, [x, 0.012, z], [x + 0.024, 0.022, z + 0.024]);
+        for row in 0..detail.count(3, 1) {
+            for key in 0..detail.count(10, 4) {
+                let (x, z) = (-0.195 + 0.04 * key as f32, 0.172 + 0.04 * row as f32);
+                screen.plain(Enamel, [x, 0.012, z], [x + 0.032, 0.022, z + 0.032]);
             }
         }
         let place =
@@ -94,17 +92,12 @@ fn tube_rack(k: &mut Things, at: Vec3, seed: u32) {
             let foot = Vec3::new(-0.115 + 0.046 * i as f32, 0.02, -0.024 + 0.048 * j as f32);
             let fill = 0.03 + 0.06 * unit(311 + seed, i * 2 + j);
             let liquid = [RedLiquid, GreenLiquid, BlueLiquid][((i + j * 2 + seed) % 3) as usize];
-            rack.turned(
-                liquid,
-                foot,
-                &[[0.0, 0.0], [0.006, 0.002], [0.011, 0.008], [0.0122, 0.014], [0.0122, fill]],
-                10,
-            );
+            rack.turned(liquid, foot, &[[0.0, 0.0], [0.009, 0.005], [0.0122, 0.014], [0.0122, fill]], 7);
             rack.turned(
                 Glass,
                 foot + Vec3::Y * (fill - 0.001),
                 &[[0.0115, 0.0], [0.0115, 0.13 - fill], [0.014, 0.134 - fill]],
-                10,
+                7,
             );
         }
     }
@@ -114,12 +107,12 @@ fn tube_rack(k: &mut Things, at: Vec3, seed: u32) {
 /// An Erlenmeyer flask with something in it.
 fn flask(k: &mut Things, at: Vec3, size: f32, liquid: Stuff) {
     let s = |p: &[[f32; 2]]| p.iter().map(|&[r, y]| [r * size, y * size]).collect::<Vec<_>>();
-    k.turned(liquid, at, &s(&[[0.07, 0.0], [0.082, 0.008], [0.085, 0.02], [0.062, 0.075]]), 20);
+    k.turned(liquid, at, &s(&[[0.07, 0.0], [0.082, 0.008], [0.085, 0.02], [0.062, 0.075]]), 16);
     k.turned(
         Glass,
         at,
         &s(&[[0.0, 0.07], [0.0635, 0.07], [0.03, 0.15], [0.024, 0.17], [0.024, 0.21], [0.03, 0.216]]),
-        20,
+        16,
     );
 }
 
@@ -128,8 +121,8 @@ fn bottle(k: &mut Things, at: Vec3, size: f32, which: u32) {
     let s = |p: &[[f32; 2]]| p.iter().map(|&[r, y]| [r * size, y * size]).collect::<Vec<_>>();
     let stuff = [Glass, BlueLiquid, Enamel, GreenLiquid, Card][(which % 5) as usize];
     let body = [[0.056, 0.0], [0.062, 0.008], [0.062, 0.15], [0.05, 0.175], [0.024, 0.19], [0.024, 0.215]];
-    k.turned(stuff, at, &s(&body), 16);
-    k.turned(Rubber, at, &s(&[[0.028, 0.21], [0.028, 0.235], [0.024, 0.24]]), 12);
+    k.turned(stuff, at, &s(&body), 10);
+    k.turned(Rubber, at, &s(&[[0.028, 0.21], [0.028, 0.235], [0.024, 0.24]]), 8);
 }
 
 fn microscope(k: &mut Things, at: Vec3) {
@@ -194,14 +187,14 @@ pub(super) fn shelf(detail: Detail) -> Things {
         let mut slot = 0;
         while x < 0.66 {
             let r = |c: u32| unit(320 + i, slot * 4 + c);
-            if r(0) < 0.5 {
+            if r(0) < 0.35 {
                 let size = 0.9 + 0.5 * r(1);
                 bottle(&mut k, Vec3::new(x + 0.08, top, 0.02 + 0.1 * (r(2) - 0.5)), size, slot + i);
                 x += 0.17 + 0.05 * r(3);
             } else {
                 let (w, h) = (0.14 + 0.14 * r(1), 0.12 + 0.2 * r(2));
                 let stuff = [Card, Blue, Enamel, Orange][(r(3) * 3.99) as usize];
-                k.block(stuff, [x + 0.01, top, -0.14], [x + w, top + h, 0.12], 0.006);
+                k.plain(stuff, [x + 0.01, top, -0.14], [x + w, top + h, 0.12]);
                 x += w + 0.03;
             }
             slot += 1;

@@ -38,8 +38,7 @@ pub(super) struct Gait {
     start: [f64; 2],
     /// Height as a multiple of the usual.
     size: f32,
-    /// Metres a cycle and metres a second, for a body of usual height.
-    stride: f32,
+    /// Metres a second, for a body of usual height.
     speed: f32,
     /// Lowest and highest height of the hips.
     height: [f32; 2],
@@ -73,12 +72,7 @@ impl Gait {
         let (leg, reach) = (0.99 * (LEG[0] + LEG[1]), PASSING * stride + 0.005);
         let low = ankle + libm::sqrtf((leg * leg - reach * reach).max(0.0));
         let height = [low, (low + 0.05).min(0.918).max(low)];
-        Gait { route, seconds, cycles, start: [start, phase], size, stride, speed, height }
-    }
-
-    /// Metres a cycle, for a body of usual height.
-    pub(super) fn stride(&self) -> f32 {
-        self.stride
+        Gait { route, seconds, cycles, start: [start, phase], size, speed, height }
     }
 
     /// The pose at a time, seconds.
@@ -198,7 +192,7 @@ impl Gait {
         let toes = from.toes * fade * fade;
         // As high as its lowest point asks for.
         let lowest = sole_points(pitch, toes).into_iter().fold(f32::INFINITY, f32::min);
-        ankle.y = CLEARANCE * 16.0 * u * u * (1.0 - u) * (1.0 - u) - lowest;
+        ankle.y = CLEARANCE * 4.0 * u * (1.0 - u) - lowest;
         Foot { ankle, heading, pitch, toes }
     }
 }

@@ -31,16 +31,16 @@ pub(super) fn reactor(detail: Detail) -> Things {
         [0.16, 2.03],
         [0.0, 2.05],
     ];
-    k.round(Steel, Vec3::ZERO, &hull, 48);
+    k.round(Steel, Vec3::ZERO, &hull, 36);
     for y in [0.84, 1.25, 1.66] {
         k.turned(
             DarkSteel,
             p(0.0, y, 0.0),
             &[[0.49, -0.025], [0.535, -0.02], [0.535, 0.02], [0.49, 0.025]],
-            48,
+            36,
         );
-        for i in 0..detail.count(24, 6) {
-            let d = Quat::from_rotation_y(TAU * i as f32 / detail.count(24, 6) as f32);
+        for i in 0..detail.count(10, 6) {
+            let d = Quat::from_rotation_y(TAU * i as f32 / detail.count(10, 6) as f32);
             k.turned_along(
                 Steel,
                 p(0.0, y, 0.0) + d * Vec3::X * 0.53,
@@ -109,16 +109,16 @@ pub(super) fn rack(detail: Detail) -> Things {
         let stuff = [Enamel, DarkSteel, Steel, Blue][(unit(340, i) * 3.99) as usize];
         k.block(stuff, [-0.265, y, 0.34], [0.265, y + 0.185, 0.375], 0.005);
         for x in [-0.235, 0.235] {
-            let grip =
-                [p(x, y + 0.03, 0.372), p(x, y + 0.03, 0.405), p(x, y + 0.15, 0.405), p(x, y + 0.15, 0.372)];
-            k.pipe(Steel, &grip, 0.006, 0.014, 6);
+            k.plain(Steel, [x - 0.006, y + 0.03, 0.372], [x + 0.006, y + 0.042, 0.41]);
+            k.plain(Steel, [x - 0.006, y + 0.14, 0.372], [x + 0.006, y + 0.152, 0.41]);
+            k.plain(Steel, [x - 0.008, y + 0.02, 0.40], [x + 0.008, y + 0.162, 0.412]);
         }
         if i % 3 == 1 {
             k.plain(Screen, [-0.18, y + 0.04, 0.37], [0.06, y + 0.15, 0.379]);
         } else {
-            for slat in 0..detail.count(7, 2) {
-                let v = y + 0.03 + 0.02 * slat as f32;
-                k.plain(Rubber, [-0.19, v, 0.37], [0.08, v + 0.009, 0.381]);
+            for slat in 0..detail.count(4, 2) {
+                let v = y + 0.03 + 0.034 * slat as f32;
+                k.plain(Rubber, [-0.19, v, 0.37], [0.08, v + 0.016, 0.381]);
             }
         }
         for lamp in 0..3 {
@@ -199,14 +199,14 @@ pub(super) fn coils(detail: Detail) -> Things {
         k.turned(liquid, p(x, 0.55, 0.0), &[[0.055, 0.0], [0.055, 1.5]], 20);
         k.turned(Steel, p(x, 2.03, 0.0), &[[0.07, 0.0], [0.13, 0.02], [0.13, 0.1], [0.05, 0.18]], 28);
         let turns = 9.0;
-        let steps = detail.facets(180, 72);
+        let steps = detail.facets(108, 63);
         let coil: Vec<Vec3> = (0..=steps)
             .map(|s| {
                 let t = s as f32 / steps as f32;
                 Quat::from_rotation_y(TAU * turns * t) * p(0.14, 0.62 + 1.36 * t, 0.0) + p(x, 0.0, 0.0)
             })
             .collect();
-        k.bar(if i == 1 { Copper } else { Glass }, &coil, 0.014, 7);
+        k.bar(if i == 1 { Copper } else { Glass }, &coil, 0.014, 6);
     }
     let over = |x: f32, z: f32| {
         [p(x, 2.12, z), p(x, 2.24, z + 0.18), p(x + 0.55, 2.24, z + 0.18), p(x + 0.55, 2.12, z)]

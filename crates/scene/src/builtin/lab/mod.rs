@@ -9,6 +9,8 @@ mod motion;
 mod palette;
 mod plan;
 mod route;
+#[cfg(test)]
+mod solids;
 mod walkers;
 
 use std::collections::BTreeMap;
