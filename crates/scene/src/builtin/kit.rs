@@ -22,6 +22,11 @@ impl<S: Copy + PartialEq> Kit<S> {
         Kit { detail, parts: Vec::new() }
     }
 
+    /// Whether the finest pieces are worth their triangles.
+    pub(super) fn fine(&self) -> bool {
+        self.detail.0 >= 0.4
+    }
+
     /// Adds a piece.
     pub(super) fn add(&mut self, of: S, piece: &Geometry, placement: &Affine3A) {
         match self.parts.iter_mut().find(|(s, _)| *s == of) {
@@ -63,7 +68,7 @@ impl<S: Copy + PartialEq> Kit<S> {
 
     /// A round bar along points.
     pub(super) fn bar(&mut self, of: S, points: &[Vec3], radius: f32, sides: u32) {
-        self.at(of, &tube(points, radius, self.detail.facets(sides, 4)), Vec3::ZERO);
+        self.at(of, &tube(points, radius, self.detail.facets(sides, 3)), Vec3::ZERO);
     }
 
     /// A pipe along points whose corners are bent with a radius.
@@ -80,7 +85,7 @@ impl<S: Copy + PartialEq> Kit<S> {
     /// A turned piece about an axis.
     pub(super) fn turned_along(&mut self, of: S, at: Vec3, axis: Vec3, profile: &[[f32; 2]], segments: u32) {
         let profile: Vec<Vec2> = profile.iter().map(|&[r, y]| v2(r, y)).collect();
-        let piece = turned(self.detail, &profile, self.detail.facets(segments, 6));
+        let piece = turned(self.detail, &profile, self.detail.facets(segments, 5));
         let rotation = Quat::from_rotation_arc(Vec3::Y, axis.normalize_or(Vec3::Y));
         self.add(of, &piece, &Affine3A::from_rotation_translation(rotation, at));
     }
@@ -89,7 +94,7 @@ impl<S: Copy + PartialEq> Kit<S> {
     pub(super) fn round(&mut self, of: S, at: Vec3, profile: &[[f32; 2]], segments: u32) {
         let profile: Vec<Vec2> = profile.iter().map(|&[r, y]| v2(r, y)).collect();
         let profile = rounded(&profile, self.detail.facets(2, 2));
-        let piece = turned(self.detail, &profile, self.detail.facets(segments, 6));
+        let piece = turned(self.detail, &profile, self.detail.facets(segments, 5));
         self.at(of, &piece, at);
     }
 

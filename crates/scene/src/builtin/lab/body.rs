@@ -133,7 +133,7 @@ pub(super) fn body(build: &Build, detail: Detail) -> Body {
     let sides = |full: u32| detail.facets(full, 6);
     let rings = |full: u32, least: u32| detail.facets(full, least);
 
-    let trunk = upward(&trunk_rows(build), rings(27, 12), sides(29), 2.3);
+    let trunk = upward(&trunk_rows(build), rings(27, 9), sides(29), 2.3);
     body.coat.add(&trunk, PELVIS, |p| {
         let spine = rise(0.96, 1.12, p.y);
         let chest = rise(1.16, 1.34, p.y);
@@ -151,30 +151,30 @@ pub(super) fn body(build: &Build, detail: Detail) -> Body {
             rows.iter().map(|&[x, y, z, w, d]| [sign * x, y, z, w * breadth, d * breadth]).collect()
         };
         let [upper, lower] = ARMS[side];
-        let sleeve = upward(&mirrored(SLEEVE, build.girth), rings(19, 10), sides(17), 2.0);
+        let sleeve = upward(&mirrored(SLEEVE, build.girth), rings(19, 6), sides(17), 2.0);
         body.coat.add(&sleeve, upper, |p| {
             let below = 1.0 - rise(1.06, 1.17, p.y);
             vec![(lower, below), (CHEST, 0.6 * rise(1.35, 1.46, p.y))]
         });
-        let hand = upward(&mirrored(HAND, 1.0), rings(11, 6), sides(12), 2.2);
-        let thumb = upward(&mirrored(THUMB, 1.0), rings(7, 4), sides(8), 2.0);
+        let hand = upward(&mirrored(HAND, 1.0), rings(11, 4), sides(12), 2.2);
+        let thumb = upward(&mirrored(THUMB, 1.0), rings(7, 3), sides(8), 2.0);
         for piece in [hand, thumb] {
             body.skin.add(&piece, lower, |_| Vec::new());
         }
         let [thigh, shin, foot, toes] = LEGS[side];
-        let leg = upward(&mirrored(LEG_ROWS, 0.5 + 0.5 * build.girth), rings(24, 11), sides(19), 2.0);
+        let leg = upward(&mirrored(LEG_ROWS, 0.5 + 0.5 * build.girth), rings(24, 7), sides(19), 2.0);
         body.trousers
             .add(&leg, thigh, |p| vec![(shin, 1.0 - rise(0.44, 0.56, p.y)), (PELVIS, rise(0.88, 0.97, p.y))]);
-        body.shoes.add(&shoe(sign, rings(17, 9), sides(16)), foot, |p| {
+        body.shoes.add(&shoe(sign, rings(17, 7), sides(16)), foot, |p| {
             vec![(toes, rise(SOLE[1] - 0.025, SOLE[1] + 0.025, p.z))]
         });
     }
-    let head = upward(HEAD_ROWS, rings(22, 10), sides(23), 2.0);
-    let nose = upward(NOSE, rings(6, 4), sides(8), 2.0);
+    let head = upward(HEAD_ROWS, rings(22, 7), sides(23), 2.0);
+    let nose = upward(NOSE, rings(6, 3), sides(8), 2.0);
     body.skin.add(&head, HEAD, |p| vec![(CHEST, 1.0 - rise(1.46, 1.53, p.y))]);
     body.skin.add(&nose, HEAD, |_| Vec::new());
     let top = if build.helmet { HELMET } else { HAIR };
-    body.top.add(&upward(top, rings(13, 7), sides(23), 2.0), HEAD, |_| Vec::new());
+    body.top.add(&upward(top, rings(13, 5), sides(23), 2.0), HEAD, |_| Vec::new());
     body
 }
 

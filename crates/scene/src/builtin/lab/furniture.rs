@@ -87,7 +87,7 @@ fn tube_rack(k: &mut Things, at: Vec3, seed: u32) {
     for x in [-0.15, 0.14] {
         rack.plain(Wood, [x, 0.0, -0.05], [x + 0.012, 0.1, 0.05]);
     }
-    for i in 0..6 {
+    for i in 0..k.detail.count(6, 2) {
         for j in 0..2 {
             let foot = Vec3::new(-0.115 + 0.046 * i as f32, 0.02, -0.024 + 0.048 * j as f32);
             let fill = 0.03 + 0.06 * unit(311 + seed, i * 2 + j);
@@ -122,7 +122,9 @@ fn bottle(k: &mut Things, at: Vec3, size: f32, which: u32) {
     let stuff = [Glass, BlueLiquid, Enamel, GreenLiquid, Card][(which % 5) as usize];
     let body = [[0.056, 0.0], [0.062, 0.008], [0.062, 0.15], [0.05, 0.175], [0.024, 0.19], [0.024, 0.215]];
     k.turned(stuff, at, &s(&body), 10);
-    k.turned(Rubber, at, &s(&[[0.028, 0.21], [0.028, 0.235], [0.024, 0.24]]), 8);
+    if k.fine() {
+        k.turned(Rubber, at, &s(&[[0.028, 0.21], [0.028, 0.235], [0.024, 0.24]]), 8);
+    }
 }
 
 fn microscope(k: &mut Things, at: Vec3) {
@@ -185,7 +187,7 @@ pub(super) fn shelf(detail: Detail) -> Things {
         let top = y + 0.029;
         let mut x = -0.74;
         let mut slot = 0;
-        while x < 0.66 {
+        while x < 0.5 {
             let r = |c: u32| unit(320 + i, slot * 4 + c);
             if r(0) < 0.35 {
                 let size = 0.9 + 0.5 * r(1);

@@ -108,10 +108,12 @@ pub(super) fn rack(detail: Detail) -> Things {
         let y = 0.12 + 0.205 * i as f32;
         let stuff = [Enamel, DarkSteel, Steel, Blue][(unit(340, i) * 3.99) as usize];
         k.block(stuff, [-0.265, y, 0.34], [0.265, y + 0.185, 0.375], 0.005);
-        for x in [-0.235, 0.235] {
-            k.plain(Steel, [x - 0.006, y + 0.03, 0.372], [x + 0.006, y + 0.042, 0.41]);
-            k.plain(Steel, [x - 0.006, y + 0.14, 0.372], [x + 0.006, y + 0.152, 0.41]);
-            k.plain(Steel, [x - 0.008, y + 0.02, 0.40], [x + 0.008, y + 0.162, 0.412]);
+        if k.fine() {
+            for x in [-0.235, 0.235] {
+                k.plain(Steel, [x - 0.006, y + 0.03, 0.372], [x + 0.006, y + 0.042, 0.41]);
+                k.plain(Steel, [x - 0.006, y + 0.14, 0.372], [x + 0.006, y + 0.152, 0.41]);
+                k.plain(Steel, [x - 0.008, y + 0.02, 0.40], [x + 0.008, y + 0.162, 0.412]);
+            }
         }
         if i % 3 == 1 {
             k.plain(Screen, [-0.18, y + 0.04, 0.37], [0.06, y + 0.15, 0.379]);
@@ -121,7 +123,7 @@ pub(super) fn rack(detail: Detail) -> Things {
                 k.plain(Rubber, [-0.19, v, 0.37], [0.08, v + 0.016, 0.381]);
             }
         }
-        for lamp in 0..3 {
+        for lamp in 0..detail.count(3, 1) {
             let x = 0.11 + 0.035 * lamp as f32;
             let stuff = if unit(341, i * 3 + lamp) < 0.6 { Signal } else { Orange };
             k.turned_along(stuff, p(x, y + 0.09, 0.373), Vec3::Z, &[[0.009, 0.0], [0.009, 0.008]], 8);

@@ -40,7 +40,7 @@ fn triangle_counts_follow_detail() {
     let small = triangle_count(&read(&SMALL));
     eprintln!("triangles: {full} at detail 1, {small} at detail {DETAIL}");
     assert!((250_000..=400_000).contains(&full), "{full}");
-    assert!((20_000..=80_000).contains(&small), "{small}");
+    assert!((20_000..=100_000).contains(&small), "{small}");
 }
 
 #[test]
