@@ -72,13 +72,11 @@ pub fn look_along(direction: Vec3) -> Quat {
     Quat::from_mat3(&Mat3::from_cols(right, back.cross(right), back)).normalize()
 }
 
+/// Control points of a camera's eye and of what it looks at.
+pub type Flight = (Vec<Vec3>, Vec<Vec3>);
+
 /// Adds cameras that [`fly`], each along its control points of eye and target: a name and a key every frame.
-pub fn place_cameras(
-    b: &mut GlbBuilder,
-    animation: AnimationId,
-    paths: [(&str, (Vec<Vec3>, Vec<Vec3>)); 2],
-    frames: u32,
-) {
+pub fn place_cameras(b: &mut GlbBuilder, animation: AnimationId, paths: [(&str, Flight); 2], frames: u32) {
     let lens = b.camera("path", std::f32::consts::FRAC_PI_3, 0.05);
     let times = frame_times(&(0..=frames as usize).collect::<Vec<_>>());
     for (name, (eye, look)) in paths {
