@@ -126,7 +126,7 @@ pub(super) fn bent(points: &[Vec3], radius: f32, pieces: u32) -> Vec<Vec3> {
         let room = 0.45 * before.distance(p).min(after.distance(p));
         // Half the angle that the line turns by.
         let half = 0.5 * libm::acosf((-back.dot(on)).clamp(-1.0, 1.0));
-        if half < 0.02 || half > 0.98 * FRAC_PI_2 {
+        if !(0.02..=0.98 * FRAC_PI_2).contains(&half) {
             out.push(p);
             continue;
         }

@@ -96,7 +96,7 @@ pub(super) fn platform(detail: Detail) -> Things {
     k
 }
 
-/// Posts with two rails and a hand rail along a line; `rise` is how much the line climbs.
+/// Posts with two rails and a hand rail along a line, which may climb.
 fn railing(k: &mut Things, from: Vec3, to: Vec3) {
     let way = to - from;
     let posts = (way.length() / 1.15) as u32 + 1;

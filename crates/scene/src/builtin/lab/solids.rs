@@ -28,7 +28,7 @@ impl Item {
     /// The box that the thing stays in.
     pub(super) fn solid(&self) -> Solid {
         let [x, z, height] = self.kind.extent();
-        let (x, z) = if self.quarters % 2 == 0 { (x, z) } else { (z, x) };
+        let (x, z) = if self.quarters.is_multiple_of(2) { (x, z) } else { (z, x) };
         let half = Vec3::new(x, 0.0, z);
         Solid::Box { min: self.at - half, max: self.at + half + Vec3::Y * height }
     }

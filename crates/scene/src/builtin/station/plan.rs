@@ -1,6 +1,8 @@
 //! Measures of the station: where everything is, whatever the detail.
 //! Metres; the middle of the hangar's deck is the origin, the hangar opens to +Z.
 
+use std::f32::consts::FRAC_PI_2;
+
 use glam::{Quat, Vec3};
 
 use crate::builtin::noise::unit;
@@ -52,8 +54,8 @@ pub(super) const CONTAINERS: &[Container] = &[
     container(-6.6, 0.0, -4.6, 0.0, 0),
     container(-4.0, 0.0, -4.6, 0.0, 1),
     container(-6.5, 1.2, -4.6, 0.04, 2),
-    container(-7.6, 0.0, 2.2, 1.5708, 1),
-    container(-7.6, 0.0, 4.8, 1.5708, 0),
+    container(-7.6, 0.0, 2.2, FRAC_PI_2, 1),
+    container(-7.6, 0.0, 4.8, FRAC_PI_2, 0),
     container(-7.6, 1.2, 2.3, 1.53, 0),
     container(4.6, 0.0, -4.7, 0.0, 2),
     container(7.2, 0.0, -4.7, 0.0, 0),
