@@ -137,10 +137,10 @@ pub(super) fn body(build: &Build, detail: Detail) -> Body {
     body.coat.add(&trunk, PELVIS, |p| {
         let spine = rise(0.96, 1.12, p.y);
         let chest = rise(1.16, 1.34, p.y);
-        // The hem follows the legs, more the longer it is.
-        let leg = (1.7 * (0.92 - p.y)).clamp(0.0, 0.8);
+        // The hem follows the legs, which would come out of it otherwise.
+        let leg = (4.0 * (0.94 - p.y)).clamp(0.0, 0.85);
         let left = rise(-0.07, 0.07, p.x);
-        if p.y < 0.92 {
+        if p.y < 0.94 {
             vec![(LEGS[0][0], leg * left), (LEGS[1][0], leg * (1.0 - left))]
         } else {
             vec![(SPINE, spine * (1.0 - chest)), (CHEST, chest)]
@@ -183,12 +183,12 @@ fn trunk_rows(build: &Build) -> Vec<[f32; 5]> {
     // A long coat flares a little.
     let flare = 0.12 * (0.78 - hem);
     let mut rows = vec![
-        [0.0, hem, 0.0, 0.172 + flare, 0.128 + flare],
-        [0.0, hem + 0.012, 0.0, 0.186 + flare, 0.142 + flare],
+        [0.0, hem, 0.0, 0.174 + flare, 0.138 + flare],
+        [0.0, hem + 0.012, 0.0, 0.188 + flare, 0.152 + flare],
     ];
-    rows.push([0.0, 0.5 * (hem + 0.90), 0.0, 0.186 + 0.5 * flare, 0.140 + 0.5 * flare]);
+    rows.push([0.0, 0.5 * (hem + 0.90), 0.0, 0.188 + 0.5 * flare, 0.149 + 0.5 * flare]);
     rows.extend([
-        [0.0, 0.90, -0.004, 0.182, 0.134],
+        [0.0, 0.90, -0.002, 0.183, 0.138],
         [0.0, 1.00, -0.005, 0.166, 0.121],
         [0.0, 1.09, -0.002, 0.154, 0.112],
         [0.0, 1.18, 0.004, 0.160, 0.117],
