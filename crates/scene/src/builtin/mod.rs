@@ -8,10 +8,15 @@
 
 mod atrium;
 pub mod builder;
+mod kit;
+mod lab;
 pub mod noise;
+mod paint;
 pub mod path;
 pub mod physics;
+mod profile;
 pub mod shapes;
+mod station;
 
 /// A scene that the library can make.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,11 +28,23 @@ pub struct Builtin {
 }
 
 /// All built-in scenes.
-pub const BUILTINS: &[Builtin] = &[Builtin {
-    name: "atrium",
-    summary: "A two-storey hall with arcades, stairs, curtains and railings, where boulders roll and spot lights sweep \
-              (15 s; camera paths path-walk and path-gallery).",
-}];
+pub const BUILTINS: &[Builtin] = &[
+    Builtin {
+        name: "atrium",
+        summary: "A two-storey hall with arcades, stairs, curtains and railings, where boulders roll and spot lights sweep \
+                  (15 s; camera paths path-walk and path-gallery).",
+    },
+    Builtin {
+        name: "station",
+        summary: "A space station of large panels, thin struts and pipes, almost still, past which 14 rocks drift \
+                  (15 s; camera paths path-deck and path-orbit).",
+    },
+    Builtin {
+        name: "lab",
+        summary: "A laboratory with machines, benches, pipes and a platform, through which 23 skinned people walk \
+                  (15 s; camera paths path-aisle and path-crane).",
+    },
+];
 
 /// Why a built-in scene could not be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -58,7 +75,7 @@ pub enum BuiltinError {
 
 /// Makes a built-in scene as a GLB that any glTF 2.0 viewer opens.
 ///
-/// `detail` in 0 … 1 (0 excluded) scales the number of triangles: 1 is full detail, 0.1 about an eighth of it, for tests. The layout,
+/// `detail` in 0 … 1 (0 excluded) scales the number of triangles: 1 is full detail, 0.1 an eighth to a fifth of it, for tests. The layout,
 /// the animation, the lights and the cameras are the same at every detail.
 ///
 /// # Errors
@@ -69,6 +86,8 @@ pub fn glb(name: &str, detail: f32) -> Result<Vec<u8>, BuiltinError> {
     }
     match name {
         "atrium" => atrium::glb(Detail(detail)),
+        "station" => station::glb(Detail(detail)),
+        "lab" => lab::glb(Detail(detail)),
         _ => Err(BuiltinError::Unknown {
             name: name.into(),
             known: BUILTINS.iter().map(|b| b.name).collect::<Vec<_>>().join(", "),

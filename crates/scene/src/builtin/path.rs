@@ -1,7 +1,9 @@
 //! Smooth camera paths: a curve for the eye at constant speed, another for what it looks at.
 
-use glam::{Quat, Vec3};
+use glam::{Mat3, Quat, Vec3};
 
+use super::builder::{AnimationId, GlbBuilder, NodeSpec, Track};
+use super::physics::frame_times;
 use crate::PosedCamera;
 
 /// A point of the uniform cubic B-spline with the given control points, whose ends it meets; `t` in 0 … 1.
@@ -61,4 +63,32 @@ pub fn fly(eye: &[Vec3], target: &[Vec3], frames: u32) -> (Vec<Vec3>, Vec<Quat>)
         rotations.push(rotation);
     }
     (positions, rotations)
+}
+
+/// A rotation that brings −Z to a direction, Y as upright as possible.
+pub fn look_along(direction: Vec3) -> Quat {
+    let back = -direction.normalize_or(Vec3::NEG_Z);
+    let right = Vec3::Y.cross(back).normalize_or(Vec3::X);
+    Quat::from_mat3(&Mat3::from_cols(right, back.cross(right), back)).normalize()
+}
+
+/// Control points of a camera's eye and of what it looks at.
+pub type Flight = (Vec<Vec3>, Vec<Vec3>);
+
+/// Adds cameras that [`fly`], each along its control points of eye and target: a name and a key every frame.
+pub fn place_cameras(b: &mut GlbBuilder, animation: AnimationId, paths: [(&str, Flight); 2], frames: u32) {
+    let lens = b.camera("path", std::f32::consts::FRAC_PI_3, 0.05);
+    let times = frame_times(&(0..=frames as usize).collect::<Vec<_>>());
+    for (name, (eye, look)) in paths {
+        let (positions, rotations) = fly(&eye, &look, frames);
+        let spec = NodeSpec {
+            camera: Some(lens),
+            translation: positions[0],
+            rotation: rotations[0],
+            ..NodeSpec::default()
+        };
+        let node = b.node(name, &spec);
+        b.channel(animation, node, &times, Track::Translation(&positions), false);
+        b.channel(animation, node, &times, Track::Rotation(&rotations), false);
+    }
 }

@@ -163,6 +163,11 @@ pub fn thin_rotations(values: &[Quat], tolerance: f32) -> Vec<usize> {
     })
 }
 
+/// Times of samples, seconds.
+pub fn frame_times(frames: &[usize]) -> Vec<f32> {
+    frames.iter().map(|&k| k as f32 / SAMPLES_PER_SECOND as f32).collect()
+}
+
 fn thin(count: usize, fits: impl Fn(usize, usize, usize, f32) -> bool) -> Vec<usize> {
     let mut kept = vec![0];
     let mut from = 0;

@@ -1,5 +1,7 @@
 //! The list of built-in scenes, its errors, and the writer.
 
+pub(super) mod document;
+
 use glam::{Mat4, Vec2, Vec3};
 
 use super::builder::{GlbBuilder, Influences, MaterialSpec, NodeSpec, Track};
@@ -91,7 +93,7 @@ fn skins_and_big_meshes_are_valid() {
     let tip = b.node("tip", &NodeSpec { parent: Some(root), translation: tip, ..NodeSpec::default() });
     let weights: Vec<[f32; 4]> = bar.positions.iter().map(|p| [1.0 - p.y, p.y, 0.0, 0.0]).collect();
     let joints = vec![[0, 1, 0, 0]; weights.len()];
-    let mesh = b.skinned_mesh("bar", &bar, material, Influences { joints: &joints, weights: &weights });
+    let mesh = b.skinned_mesh("bar", &[(&bar, material, Influences { joints: &joints, weights: &weights })]);
     let skin = b.skin("skin", &[root, tip], &[Mat4::IDENTITY, Mat4::from_translation(-Vec3::Y)]);
     b.node("bar", &NodeSpec { mesh: Some(mesh), skin: Some(skin), receives: false, ..NodeSpec::default() });
     let animation = b.animation("grow");

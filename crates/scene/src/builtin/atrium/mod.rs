@@ -3,15 +3,15 @@
 mod motion;
 mod parts;
 mod plan;
-mod profile;
 mod textures;
 mod things;
 
-use std::f32::consts::{FRAC_PI_2, FRAC_PI_3, PI};
+use std::f32::consts::{FRAC_PI_2, PI};
 
 use glam::{Quat, Vec2, Vec3, Vec4};
 
 use super::builder::*;
+use super::physics::frame_times;
 use super::shapes::{boulder, ring_slab, ring_slab_faces};
 use super::{BuiltinError, Detail, path, physics};
 use crate::LightKind;
@@ -53,12 +53,17 @@ pub(super) fn glb(detail: Detail) -> Result<Vec<u8>, BuiltinError> {
     let animation = b.animation("atrium");
     light(&mut b, &palette, animation, detail);
     roll_boulders(&mut b, &palette, animation, detail);
-    place_cameras(&mut b, animation);
+    path::place_cameras(
+        &mut b,
+        animation,
+        [("path-walk", motion::walk()), ("path-gallery", motion::flight())],
+        FRAMES,
+    );
     b.finish()
 }
 
 fn palette(b: &mut GlbBuilder) -> Result<Palette, BuiltinError> {
-    let size = [textures::SIZE; 2];
+    let size = [super::paint::SIZE; 2];
     let floor = b.texture("floor", size, &textures::floor(), false)?;
     let stone = b.texture("stone", size, &textures::stone(), false)?;
     let wood = b.texture("wood", size, &textures::wood(), false)?;
@@ -341,7 +346,7 @@ fn light(b: &mut GlbBuilder, p: &Palette, animation: AnimationId, detail: Detail
         kind: LightKind::Directional,
     };
     let sun = b.light("sun", &sun);
-    let rotation = motion::look_along(Vec3::new(0.42, -1.0, -0.30));
+    let rotation = path::look_along(Vec3::new(0.42, -1.0, -0.30));
     let translation = Vec3::new(-5.0, 14.0, 4.0);
     b.node("sun", &NodeSpec { light: Some(sun), rotation, translation, ..NodeSpec::default() });
 
@@ -423,27 +428,6 @@ fn roll_boulders(b: &mut GlbBuilder, p: &Palette, animation: AnimationId, detail
         let kept = physics::thin_rotations(&motion.rotations, KEY_TOLERANCE.1);
         let values: Vec<Quat> = kept.iter().map(|&k| motion.rotations[k]).collect();
         b.channel(animation, node, &frame_times(&kept), Track::Rotation(&values), false);
-    }
-}
-
-fn frame_times(frames: &[usize]) -> Vec<f32> {
-    frames.iter().map(|&k| k as f32 / physics::SAMPLES_PER_SECOND as f32).collect()
-}
-
-fn place_cameras(b: &mut GlbBuilder, animation: AnimationId) {
-    let lens = b.camera("path", FRAC_PI_3, 0.05);
-    let times = frame_times(&(0..=FRAMES as usize).collect::<Vec<_>>());
-    for (name, (eye, look)) in [("path-walk", motion::walk()), ("path-gallery", motion::flight())] {
-        let (positions, rotations) = path::fly(&eye, &look, FRAMES);
-        let spec = NodeSpec {
-            camera: Some(lens),
-            translation: positions[0],
-            rotation: rotations[0],
-            ..NodeSpec::default()
-        };
-        let node = b.node(name, &spec);
-        b.channel(animation, node, &times, Track::Translation(&positions), false);
-        b.channel(animation, node, &times, Track::Rotation(&rotations), false);
     }
 }
 

@@ -1,9 +1,10 @@
 //! What moves in the atrium: boulders, spot lights, and the two cameras.
 
-use glam::{Mat3, Quat, Vec3};
+use glam::{Quat, Vec3};
 
 use super::plan::*;
 use crate::builtin::noise::unit;
+use crate::builtin::path::look_along;
 use crate::builtin::physics::{Body, Push};
 use crate::builtin::shapes::boulder_points;
 
@@ -209,11 +210,4 @@ impl Spot {
         );
         look_along(self.aim + self.sweep * swing - self.at)
     }
-}
-
-/// A rotation that brings −Z to a direction, Y as upright as possible.
-pub(super) fn look_along(direction: Vec3) -> Quat {
-    let back = -direction.normalize_or(Vec3::NEG_Z);
-    let right = Vec3::Y.cross(back).normalize_or(Vec3::X);
-    Quat::from_mat3(&Mat3::from_cols(right, back.cross(right), back)).normalize()
 }

@@ -3,8 +3,8 @@
 use glam::{Vec2, Vec3};
 
 use super::plan::*;
-use super::profile::{block, rounded, turned, v2};
 use crate::builtin::Detail;
+use crate::builtin::profile::{block, rounded, turned, v2};
 use crate::builtin::shapes::*;
 
 /// A column from its plinth to its abacus; it stands 2 cm in the ground and reaches 2 cm into what it carries.

@@ -1,51 +1,17 @@
 //! The atrium as a file: valid, closed, outward, the same twice; boulders and cameras where they should be.
 
-use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-use glam::{Mat4, Quat, Vec3};
+use glam::Quat;
 
 use super::motion::{self, FRAMES, SECONDS};
 use super::plan::{CEILING, ROOM, solids};
+use crate::builtin::tests::document::{self, point_triangle_distance, read, still_triangles, triangle_count};
 use crate::builtin::{glb, path, physics};
 
 const DETAIL: f32 = 0.1;
 
 static SMALL: LazyLock<Vec<u8>> = LazyLock::new(|| glb("atrium", DETAIL).expect("the small atrium"));
-
-struct Doc {
-    gltf: gltf::Gltf,
-    bin: Vec<u8>,
-}
-
-fn read(bytes: &[u8]) -> Doc {
-    let mut gltf = gltf::Gltf::from_slice(bytes).expect("valid glTF");
-    let bin = gltf.blob.take().expect("a binary chunk");
-    Doc { gltf, bin }
-}
-
-fn triangle_count(doc: &Doc) -> usize {
-    let of_mesh = |m: gltf::Mesh<'_>| -> usize {
-        m.primitives().map(|p| p.indices().expect("indexed").count() / 3).sum()
-    };
-    doc.gltf.nodes().filter_map(|n| n.mesh()).map(of_mesh).sum()
-}
-
-/// Corners of all triangles of a mesh, with its normals.
-fn triangles(doc: &Doc, mesh: &gltf::Mesh<'_>) -> (Vec<[Vec3; 3]>, Vec<Vec3>) {
-    let (mut corners, mut normals) = (Vec::new(), Vec::new());
-    for primitive in mesh.primitives() {
-        let reader = primitive.reader(|_| Some(&doc.bin));
-        let positions: Vec<Vec3> = reader.read_positions().expect("positions").map(Vec3::from).collect();
-        let own: Vec<Vec3> = reader.read_normals().expect("normals").map(Vec3::from).collect();
-        assert_eq!(own.len(), positions.len());
-        assert_eq!(reader.read_tex_coords(0).expect("uvs").into_f32().count(), positions.len());
-        normals.extend(own);
-        let indices: Vec<u32> = reader.read_indices().expect("indices").into_u32().collect();
-        corners.extend(indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|i| positions[i as usize])));
-    }
-    (corners, normals)
-}
 
 /// Single layers, open on purpose.
 fn is_sheet(name: &str) -> bool {
@@ -78,69 +44,20 @@ fn triangle_counts_follow_detail() {
 
 #[test]
 fn layout_does_not_depend_on_detail() {
-    let (a, b) = (read(&SMALL), read(&glb("atrium", 0.2).expect("atrium")));
-    let nodes = |d: &Doc| -> Vec<(String, Mat4)> {
-        let of = |n: gltf::Node<'_>| {
-            (n.name().unwrap_or("").to_string(), Mat4::from_cols_array_2d(&n.transform().matrix()))
-        };
-        d.gltf.nodes().map(of).collect()
-    };
-    assert_eq!(nodes(&a), nodes(&b));
+    let other = read(&glb("atrium", 0.2).expect("atrium"));
+    assert_eq!(document::layout(&read(&SMALL)), document::layout(&other));
 }
 
 #[test]
 fn meshes_are_closed_and_outward() {
     for detail in [DETAIL, 1.0] {
-        let doc = read(&glb("atrium", detail).expect("atrium"));
-        for mesh in doc.gltf.meshes() {
-            let name = mesh.name().expect("named");
-            let (corners, normals) = triangles(&doc, &mesh);
-            for n in normals {
-                assert!((n.length() - 1.0).abs() < 1e-4, "{name}: normal {n}");
-            }
-            // Adding zero makes −0 equal to 0 in the keys.
-            let key = |p: Vec3| (p + Vec3::ZERO).to_array().map(f32::to_bits);
-            let mut edges: BTreeMap<_, i32> = BTreeMap::new();
-            let mut volume = 0.0_f64;
-            for t in &corners {
-                let [a, b, c] = *t;
-                assert!((b - a).cross(c - a).length() > 0.0, "{name}: a triangle without area at {a}");
-                volume += f64::from(a.dot(b.cross(c)));
-                for (p, q) in [(a, b), (b, c), (c, a)] {
-                    let (p, q) = (key(p), key(q));
-                    *edges.entry((p.min(q), p.max(q))).or_default() += if p < q { 1 } else { -1 };
-                }
-            }
-            if !is_sheet(name) {
-                let open = edges.iter().filter(|(_, balance)| **balance != 0).count();
-                assert_eq!(open, 0, "{name}: edges without their opposite, at detail {detail}");
-                assert!(volume > 0.0, "{name}: inside out");
-            }
-        }
+        document::assert_closed(&read(&glb("atrium", detail).expect("atrium")), is_sheet);
     }
 }
 
 #[test]
 fn vertex_normals_agree_with_faces() {
-    let doc = read(&SMALL);
-    for mesh in doc.gltf.meshes() {
-        for primitive in mesh.primitives() {
-            let reader = primitive.reader(|_| Some(&doc.bin));
-            let p: Vec<Vec3> = reader.read_positions().expect("positions").map(Vec3::from).collect();
-            let n: Vec<Vec3> = reader.read_normals().expect("normals").map(Vec3::from).collect();
-            let indices: Vec<u32> = reader.read_indices().expect("indices").into_u32().collect();
-            for t in indices.chunks_exact(3) {
-                let [a, b, c] = [t[0], t[1], t[2]].map(|i| i as usize);
-                let face = (p[b] - p[a]).cross(p[c] - p[a]).normalize();
-                assert!(
-                    face.dot(n[a] + n[b] + n[c]) > 0.0,
-                    "{:?}: a normal points inward at {}",
-                    mesh.name(),
-                    p[a]
-                );
-            }
-        }
-    }
+    document::assert_normals_agree(&read(&SMALL));
 }
 
 #[test]
@@ -230,36 +147,11 @@ fn kept_keys_reproduce_all_frames() {
     }
 }
 
-/// World corners of everything that stands still.
-fn still_triangles(doc: &Doc) -> Vec<[Vec3; 3]> {
-    let mut all = Vec::new();
-    for node in doc.gltf.nodes() {
-        let Some(mesh) = node.mesh() else { continue };
-        if node.name().is_some_and(|n| n.starts_with("boulder")) {
-            continue;
-        }
-        let world = Mat4::from_cols_array_2d(&node.transform().matrix());
-        let (corners, _) = triangles(doc, &mesh);
-        all.extend(corners.iter().map(|t| t.map(|p| world.transform_point3(p))));
-    }
-    all
-}
-
-fn point_triangle_distance(p: Vec3, [a, b, c]: [Vec3; 3]) -> f32 {
-    let segment = |a: Vec3, b: Vec3| {
-        let t = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
-        p.distance(a.lerp(b, t))
-    };
-    let n = (b - a).cross(c - a).normalize_or_zero();
-    let inside = [(a, b), (b, c), (c, a)].iter().all(|&(q, r)| (r - q).cross(p - q).dot(n) >= 0.0);
-    if inside { (p - a).dot(n).abs() } else { segment(a, b).min(segment(b, c)).min(segment(c, a)) }
-}
-
 #[test]
 fn cameras_keep_clear() {
     const CLEARANCE: f32 = 0.3;
     let doc = read(&SMALL);
-    let still = still_triangles(&doc);
+    let still = still_triangles(&doc, |name| !name.starts_with("boulder"));
     let boxes: Vec<crate::Aabb> = still.iter().map(|t| crate::Aabb::from_points(*t)).collect();
     let solids = solids();
     let bodies = motion::boulders();

@@ -1,30 +1,7 @@
 //! Procedural textures of the atrium: RGBA texels from integer noise, a whole number of features a metre.
 
-use glam::Vec3;
-
-use crate::builtin::noise::{fractal_noise, hash};
-
-/// Texels a side of every texture.
-pub(super) const SIZE: u32 = 256;
-
-fn paint(texel: impl Fn(u32, u32) -> [f32; 4]) -> Vec<u8> {
-    let mut rgba = Vec::with_capacity((4 * SIZE * SIZE) as usize);
-    for y in 0..SIZE {
-        for x in 0..SIZE {
-            rgba.extend(texel(x, y).map(|c| libm::roundf(255.0 * c.clamp(0.0, 1.0)) as u8));
-        }
-    }
-    rgba
-}
-
-/// Noise that repeats over the texture: two shifted copies, blended across the seam.
-fn tiling(seed: u32, x: u32, y: u32, stretch: [f32; 2], octaves: u32) -> f32 {
-    let (u, v) = (x as f32 / SIZE as f32, y as f32 / SIZE as f32);
-    let at = |u: f32, v: f32| fractal_noise(seed, Vec3::new(u * stretch[0], v * stretch[1], 3.5), octaves);
-    let top = at(u, v) * (1.0 - u) + at(u - 1.0, v) * u;
-    let bottom = at(u, v - 1.0) * (1.0 - u) + at(u - 1.0, v - 1.0) * u;
-    top * (1.0 - v) + bottom * v
-}
+use crate::builtin::noise::hash;
+use crate::builtin::paint::{SIZE, paint, tiling};
 
 /// Floor tiles, two by two a metre, alternately light and dark, each of its own shade, with grout.
 pub(super) fn floor() -> Vec<u8> {

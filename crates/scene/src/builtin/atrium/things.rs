@@ -5,9 +5,9 @@ use std::f32::consts::FRAC_PI_2;
 use glam::{Affine3A, Quat, Vec3};
 
 use super::plan::*;
-use super::profile::{block, rounded, turned, v2};
 use crate::builtin::Detail;
 use crate::builtin::noise::unit;
+use crate::builtin::profile::{block, rounded, turned, v2};
 use crate::builtin::shapes::*;
 
 /// A slender vase with a neck, hollow.

@@ -1,15 +1,15 @@
 //! Writes a glTF 2.0 document and its buffer as one GLB: the ground that every built-in scene stands on.
 
+mod binary;
+mod mesh;
 mod spec;
+mod surface;
 
 use std::collections::BTreeMap;
-use std::io::Cursor;
 
-use glam::{Mat4, Quat, Vec3};
+use glam::{Quat, Vec3};
 use gltf_json as json;
-use image::ImageEncoder;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use json::accessor::{ComponentType, GenericComponentType, Type};
+use json::accessor::Type;
 use json::extensions::scene::khr_lights_punctual as punctual;
 use json::validation::Checked::Valid;
 use json::validation::USize64;
@@ -17,6 +17,7 @@ use serde_json::value::RawValue;
 
 use super::BuiltinError;
 use super::shapes::Geometry;
+use binary::{Bounds, flat3, pad};
 pub use spec::{Influences, LightSpec, MaterialSpec, NodeSpec, Track, rotation_y};
 
 /// A material in the document.
@@ -67,118 +68,6 @@ impl GlbBuilder {
         let mut builder = GlbBuilder::default();
         builder.root.asset.generator = Some("dapple built-in scenes".into());
         builder
-    }
-
-    /// Adds an image of `width × height` RGBA texels, rows from the top, embedded as PNG and repeated outside 0 … 1;
-    /// `nearest` turns bilinear filtering off.
-    ///
-    /// # Errors
-    /// [`BuiltinError::Png`] if `rgba8` is not `4 × width × height` bytes.
-    pub fn texture(
-        &mut self,
-        name: &str,
-        [width, height]: [u32; 2],
-        rgba8: &[u8],
-        nearest: bool,
-    ) -> Result<TextureId, BuiltinError> {
-        let mut png = Vec::new();
-        if rgba8.len() as u64 != 4 * u64::from(width) * u64::from(height) {
-            return Err(BuiltinError::Png {
-                name: name.into(),
-                reason: format!("{} bytes for {width} × {height} RGBA texels", rgba8.len()),
-            });
-        }
-        PngEncoder::new_with_quality(Cursor::new(&mut png), CompressionType::Default, FilterType::Adaptive)
-            .write_image(rgba8, width, height, image::ExtendedColorType::Rgba8)
-            .map_err(|e| BuiltinError::Png { name: name.into(), reason: e.to_string() })?;
-        let view = self.push_view(&png, None);
-        let source = self.root.push(json::Image {
-            buffer_view: Some(view),
-            mime_type: Some(json::image::MimeType("image/png".into())),
-            name: Some(name.into()),
-            uri: None,
-            extensions: None,
-            extras: None,
-        });
-        let sampler = self.sampler(nearest);
-        let texture = self.root.push(json::Texture {
-            name: Some(name.into()),
-            sampler: Some(sampler),
-            source,
-            extensions: None,
-            extras: None,
-        });
-        Ok(TextureId(id(texture)))
-    }
-
-    /// Adds a material.
-    pub fn material(&mut self, name: &str, spec: &MaterialSpec) -> MaterialId {
-        let peak = spec.emissive.max_element();
-        let strength = (peak > 1.0).then(|| {
-            self.use_extension("KHR_materials_emissive_strength");
-            json::extensions::material::EmissiveStrength {
-                emissive_strength: json::extensions::material::EmissiveStrengthFactor(peak),
-            }
-        });
-        let material = json::Material {
-            name: Some(name.into()),
-            alpha_mode: Valid(match spec.alpha_cutoff {
-                Some(_) => json::material::AlphaMode::Mask,
-                None => json::material::AlphaMode::Opaque,
-            }),
-            alpha_cutoff: spec.alpha_cutoff.map(json::material::AlphaCutoff),
-            double_sided: spec.double_sided,
-            pbr_metallic_roughness: json::material::PbrMetallicRoughness {
-                base_color_factor: json::material::PbrBaseColorFactor(spec.base_color.to_array()),
-                base_color_texture: spec.texture.map(|t| json::texture::Info {
-                    index: json::Index::new(t.0),
-                    tex_coord: 0,
-                    extensions: None,
-                    extras: None,
-                }),
-                metallic_factor: json::material::StrengthFactor(spec.metallic),
-                roughness_factor: json::material::StrengthFactor(spec.roughness),
-                ..Default::default()
-            },
-            emissive_factor: json::material::EmissiveFactor((spec.emissive / peak.max(1.0)).to_array()),
-            extensions: strength.map(|emissive_strength| json::extensions::material::Material {
-                emissive_strength: Some(emissive_strength),
-                ..Default::default()
-            }),
-            ..Default::default()
-        };
-        MaterialId(id(self.root.push(material)))
-    }
-
-    /// Adds a rigid mesh: one primitive for each geometry that is not empty. Indices are 16 bits wide where they fit.
-    pub fn mesh(&mut self, name: &str, parts: &[(&Geometry, MaterialId)]) -> MeshId {
-        self.push_mesh(name, parts.iter().map(|&(g, m)| (g, m, None)))
-    }
-
-    /// Adds a mesh of one primitive that a skin deforms; `influences` has one entry a vertex.
-    pub fn skinned_mesh(
-        &mut self,
-        name: &str,
-        geometry: &Geometry,
-        material: MaterialId,
-        influences: Influences<'_>,
-    ) -> MeshId {
-        self.push_mesh(name, std::iter::once((geometry, material, Some(influences))))
-    }
-
-    /// Adds a skin: joint nodes and the matrices that bring mesh space to each joint's space in the bind pose.
-    pub fn skin(&mut self, name: &str, joints: &[NodeId], inverse_bind: &[Mat4]) -> SkinId {
-        let columns: Vec<f32> = inverse_bind.iter().flat_map(|m| m.to_cols_array()).collect();
-        let matrices = self.push_floats(&columns, Type::Mat4, Bounds::No, None);
-        let skin = json::Skin {
-            inverse_bind_matrices: Some(matrices),
-            joints: joints.iter().map(|j| json::Index::new(j.0)).collect(),
-            name: Some(name.into()),
-            skeleton: None,
-            extensions: None,
-            extras: None,
-        };
-        SkinId(id(self.root.push(skin)))
     }
 
     /// Adds a perspective camera: vertical field of view in radians, near plane in metres, no far plane.
@@ -355,168 +244,11 @@ impl GlbBuilder {
         Ok(glb)
     }
 
-    fn push_mesh<'a>(
-        &mut self,
-        name: &str,
-        parts: impl Iterator<Item = (&'a Geometry, MaterialId, Option<Influences<'a>>)>,
-    ) -> MeshId {
-        let target = Some(json::buffer::Target::ArrayBuffer);
-        let mut primitives = Vec::new();
-        for (geometry, material, influences) in parts {
-            if geometry.triangles.is_empty() {
-                continue;
-            }
-            let mut attributes = BTreeMap::new();
-            let positions = self.push_floats(flat3(&geometry.positions), Type::Vec3, Bounds::Yes, target);
-            attributes.insert(Valid(json::mesh::Semantic::Positions), positions);
-            let normals = self.push_floats(flat3(&geometry.normals), Type::Vec3, Bounds::No, target);
-            attributes.insert(Valid(json::mesh::Semantic::Normals), normals);
-            let uvs: &[f32] = bytemuck::cast_slice(&geometry.uvs);
-            let uvs = self.push_floats(uvs, Type::Vec2, Bounds::No, target);
-            attributes.insert(Valid(json::mesh::Semantic::TexCoords(0)), uvs);
-            if let Some(Influences { joints, weights }) = influences {
-                let bytes: Vec<u8> = joints.iter().flatten().flat_map(|j| j.to_le_bytes()).collect();
-                let view = self.push_view(&bytes, target);
-                let joints = self.push_accessor(view, joints.len(), ComponentType::U16, Type::Vec4, None);
-                attributes.insert(Valid(json::mesh::Semantic::Joints(0)), joints);
-                let weights: Vec<f32> = weights.iter().flatten().copied().collect();
-                let weights = self.push_floats(&weights, Type::Vec4, Bounds::No, target);
-                attributes.insert(Valid(json::mesh::Semantic::Weights(0)), weights);
-            }
-            let indices = self.push_indices(geometry);
-            primitives.push(json::mesh::Primitive {
-                attributes,
-                extensions: None,
-                extras: None,
-                indices: Some(indices),
-                material: Some(json::Index::new(material.0)),
-                mode: Valid(json::mesh::Mode::Triangles),
-                targets: None,
-            });
-        }
-        let mesh =
-            json::Mesh { name: Some(name.into()), primitives, weights: None, extensions: None, extras: None };
-        MeshId(id(self.root.push(mesh)))
-    }
-
-    fn push_indices(&mut self, geometry: &Geometry) -> json::Index<json::Accessor> {
-        let flat = geometry.triangles.iter().flatten().copied();
-        // 65535 itself is a primitive restart, which glTF forbids.
-        let (bytes, component): (Vec<u8>, _) = if geometry.positions.len() < 65536 {
-            (flat.flat_map(|i| (i as u16).to_le_bytes()).collect(), ComponentType::U16)
-        } else {
-            (flat.flat_map(|i| i.to_le_bytes()).collect(), ComponentType::U32)
-        };
-        let view = self.push_view(&bytes, Some(json::buffer::Target::ElementArrayBuffer));
-        self.push_accessor(view, 3 * geometry.triangles.len(), component, Type::Scalar, None)
-    }
-
-    fn time_accessor(&mut self, times: &[f32]) -> json::Index<json::Accessor> {
-        // Channels sampled at the same times share the accessor.
-        let key: Vec<u8> = times.iter().flat_map(|t| t.to_le_bytes()).collect();
-        if let Some(&accessor) = self.time_accessors.get(&key) {
-            return json::Index::new(accessor);
-        }
-        let accessor = self.push_floats(times, Type::Scalar, Bounds::Yes, None);
-        self.time_accessors.insert(key, id(accessor));
-        accessor
-    }
-
-    fn sampler(&mut self, nearest: bool) -> json::Index<json::texture::Sampler> {
-        if let Some(&sampler) = self.samplers.get(&nearest) {
-            return json::Index::new(sampler);
-        }
-        use json::texture::{MagFilter, MinFilter, Sampler};
-        let (mag, min) = match nearest {
-            true => (MagFilter::Nearest, MinFilter::Nearest),
-            false => (MagFilter::Linear, MinFilter::LinearMipmapLinear),
-        };
-        let sampler =
-            Sampler { mag_filter: Some(Valid(mag)), min_filter: Some(Valid(min)), ..Sampler::default() };
-        let sampler = self.root.push(sampler);
-        self.samplers.insert(nearest, id(sampler));
-        sampler
-    }
-
     fn use_extension(&mut self, name: &str) {
         if !self.root.extensions_used.iter().any(|e| e == name) {
             self.root.extensions_used.push(name.into());
         }
     }
-
-    fn push_view(
-        &mut self,
-        bytes: &[u8],
-        target: Option<json::buffer::Target>,
-    ) -> json::Index<json::buffer::View> {
-        pad(&mut self.bin, 0);
-        let byte_offset = self.bin.len();
-        self.bin.extend_from_slice(bytes);
-        self.root.push(json::buffer::View {
-            buffer: json::Index::new(0),
-            byte_length: USize64::from(bytes.len()),
-            byte_offset: Some(USize64::from(byte_offset)),
-            byte_stride: None,
-            name: None,
-            target: target.map(Valid),
-            extensions: None,
-            extras: None,
-        })
-    }
-
-    fn push_floats(
-        &mut self,
-        values: &[f32],
-        type_: Type,
-        bounds: Bounds,
-        target: Option<json::buffer::Target>,
-    ) -> json::Index<json::Accessor> {
-        let width = type_.multiplicity();
-        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
-        let view = self.push_view(&bytes, target);
-        let bounds = matches!(bounds, Bounds::Yes).then(|| {
-            let fold = |start: f32, pick: fn(f32, f32) -> f32| -> json::Value {
-                (0..width)
-                    .map(|c| values.iter().skip(c).step_by(width).copied().fold(start, pick))
-                    .collect::<Vec<f32>>()
-                    .into()
-            };
-            (fold(f32::INFINITY, f32::min), fold(f32::NEG_INFINITY, f32::max))
-        });
-        self.push_accessor(view, values.len() / width, ComponentType::F32, type_, bounds)
-    }
-
-    fn push_accessor(
-        &mut self,
-        view: json::Index<json::buffer::View>,
-        count: usize,
-        component: ComponentType,
-        type_: Type,
-        bounds: Option<(json::Value, json::Value)>,
-    ) -> json::Index<json::Accessor> {
-        let (min, max) = bounds.unzip();
-        self.root.push(json::Accessor {
-            buffer_view: Some(view),
-            byte_offset: None,
-            count: USize64::from(count),
-            component_type: Valid(GenericComponentType(component)),
-            type_: Valid(type_),
-            min,
-            max,
-            name: None,
-            normalized: false,
-            sparse: None,
-            extensions: None,
-            extras: None,
-        })
-    }
-}
-
-/// Whether an accessor states its smallest and largest values.
-#[derive(Clone, Copy)]
-enum Bounds {
-    Yes,
-    No,
 }
 
 fn node_extras(spec: &NodeSpec) -> json::Extras {
@@ -531,14 +263,4 @@ fn node_extras(spec: &NodeSpec) -> json::Extras {
 
 fn id<T>(index: json::Index<T>) -> u32 {
     index.value() as u32
-}
-
-fn flat3(v: &[Vec3]) -> &[f32] {
-    bytemuck::cast_slice(v)
-}
-
-fn pad(bytes: &mut Vec<u8>, with: u8) {
-    while !bytes.len().is_multiple_of(4) {
-        bytes.push(with);
-    }
 }

@@ -11,6 +11,8 @@ pub struct MaterialSpec {
     pub base_color: Vec4,
     /// Base colour texture (sRGB), read with the mesh's only UV set.
     pub texture: Option<TextureId>,
+    /// Normal map, read with the same UV set.
+    pub normal_map: Option<TextureId>,
     /// 0 dielectric … 1 metal.
     pub metallic: f32,
     /// Perceptual roughness, 0 … 1.
@@ -28,6 +30,7 @@ impl Default for MaterialSpec {
         MaterialSpec {
             base_color: Vec4::ONE,
             texture: None,
+            normal_map: None,
             metallic: 0.0,
             roughness: 0.9,
             emissive: Vec3::ZERO,

@@ -1,12 +1,14 @@
 //! Triangle shapes to build scenes from: closed ones are counter-clockwise from outside; texture coordinates are metres.
 
 mod building;
+mod loft;
 mod organic;
 mod swept;
 
 use glam::{Affine3A, Vec2, Vec3};
 
 pub use building::{arcade_wall, ring_slab, ring_slab_faces, stairs};
+pub use loft::{Girth, between, loft, oval};
 pub use organic::{boulder, boulder_points, cloth};
 pub use swept::{Frame, arc_frames, circle, lathe, rectangle, sweep, tube};
 

@@ -44,7 +44,7 @@ pub fn cloth(width: f32, height: f32, folds: f32, depth: f32, [nx, ny]: [u32; 2]
 }
 
 /// Normals of vertices as the sum of the areas around them.
-fn smooth_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
+pub(super) fn smooth_normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
     let mut normals = vec![Vec3::ZERO; positions.len()];
     for t in triangles {
         let [a, b, c] = t.map(|i| positions[i as usize]);
