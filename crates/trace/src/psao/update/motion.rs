@@ -18,6 +18,8 @@ pub(super) const REST_STEPS: u32 = 60;
 pub(super) struct Near {
     bounds_world: Aabb,
     reach_m: f32,
+    /// Part of the reach: more than rounding can move rays, and what they meet.
+    margin_m: f32,
 }
 
 impl Near {
@@ -25,7 +27,8 @@ impl Near {
     pub(super) fn new(bounds_world: Aabb, radius_m: f32) -> Near {
         let b = &bounds_world;
         let magnitude = if b.is_empty() { 0.0 } else { b.min.abs().max(b.max.abs()).max_element() };
-        Near { bounds_world, reach_m: radius_m * 1.001 + 1e-3 * (1.0 + magnitude * 0.01) }
+        let margin_m = radius_m * 0.001 + 1e-3 * (1.0 + magnitude * 0.01);
+        Near { bounds_world, reach_m: radius_m + margin_m, margin_m }
     }
 
     /// Whether a point in `bounds_world` may see it.
@@ -39,14 +42,33 @@ impl Near {
         self.bounds_world.distance_squared(position_world) <= reach_m * reach_m
     }
 
-    /// Whether rays into the hemisphere around `normal` may meet it.
-    pub(super) fn rises_above(&self, position_world: Vec3, normal: Vec3) -> bool {
-        let b = &self.bounds_world;
-        let farthest = Vec3::select(normal.cmpge(Vec3::ZERO), b.max, b.min);
-        // A ray's rounding turns it below the horizon by far less than the margin that is part of the reach.
-        let margin = 1e-3 * self.reach_m;
-        (farthest - position_world).dot(normal) >= -margin
+    /// Around all directions in which rays from `origin_world` to above the surface with that normal may meet it; `None`
+    /// where there are none.
+    pub(super) fn cone(&self, origin_world: Vec3, normal: Vec3) -> Option<Cone> {
+        let b = self.bounds_world.inflated(self.margin_m);
+        let min = (b.min - origin_world).max(Vec3::splat(-self.reach_m));
+        let max = (b.max - origin_world).min(Vec3::splat(self.reach_m));
+        let highest = Vec3::select(normal.cmpge(Vec3::ZERO), max, min);
+        if min.cmpgt(max).any() || highest.dot(normal) < -self.margin_m {
+            return None;
+        }
+        let (center, radius_squared) = (0.5 * (min + max), 0.25 * (max - min).length_squared());
+        let distance_squared = center.length_squared();
+        if distance_squared <= 1.01 * radius_squared {
+            return Some(Cone { axis: Vec3::ZERO, least_cosine: -1.0 });
+        }
+        let cosine = (1.0 - radius_squared / distance_squared).sqrt();
+        Some(Cone { axis: center / distance_squared.sqrt(), least_cosine: cosine - 1e-3 })
     }
+}
+
+/// Directions around an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Cone {
+    /// Unit length, or zero if the cone holds all directions.
+    pub(super) axis: Vec3,
+    /// Directions whose cosine with the axis is less lie outside.
+    pub(super) least_cosine: f32,
 }
 
 /// What the updater remembers of where instances are.

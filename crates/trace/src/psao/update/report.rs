@@ -32,7 +32,7 @@ pub struct StepCounts {
     pub oldest_steps: u32,
     /// Rays of `traced_full`.
     pub rays_full: u64,
-    /// Rays of `traced_movers`.
+    /// Rays of `traced_movers`, those included that boxes alone have answered.
     pub rays_movers: u64,
     /// Rays of `refined`.
     pub rays_refined: u64,

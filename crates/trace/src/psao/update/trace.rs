@@ -5,7 +5,7 @@ use dapple_store::points::Change;
 use glam::Vec3;
 
 use super::clusters::{Cluster, Memory, bits};
-use super::motion::Near;
+use super::motion::{Cone, Near};
 use super::patterns::Patterns;
 use super::{StepCounts, UpdateParams};
 use crate::psao::generate::{Anchor, PosedPoint};
@@ -44,6 +44,7 @@ struct Surface<'a> {
 pub(super) struct Scratch {
     local: Vec<Vec3>,
     world: Vec<Vec3>,
+    cones: Vec<Cone>,
 }
 
 /// A collapsed triangle shows nothing; open is the neutral value.
@@ -64,9 +65,38 @@ impl<'a> Surface<'a> {
         self.ask(blockers, local, open, &mut scratch.world)
     }
 
+    /// Of the first directions that are not `closed`, those in which a mover may be met; `None` if there are none.
+    fn towards(&self, movers: &[&Near], closed: &BlockedMask, scratch: &mut Scratch) -> Option<BlockedMask> {
+        let PosedPoint { position, normal, tangent } = self.posed;
+        let origin_world = offset_origin(position, normal);
+        let Scratch { cones, .. } = scratch;
+        cones.clear();
+        // To the point's own frame, instead of all directions to the world.
+        let local = |axis: Vec3| Vec3::new(axis.dot(tangent), axis.dot(self.bitangent), axis.dot(normal));
+        let reaching = movers.iter().filter(|near| near.reaches(position, 0.0));
+        cones.extend(
+            reaching
+                .filter_map(|near| near.cone(origin_world, normal))
+                .map(|cone| Cone { axis: local(cone.axis), ..cone }),
+        );
+        let mut ask = BlockedMask::default();
+        if cones.is_empty() {
+            return None;
+        }
+        let directions = self.context.patterns.of(self.site).chunks(64);
+        for ((ask, closed), directions) in ask.iter_mut().zip(closed).zip(directions) {
+            for cone in cones.iter() {
+                let inside = |d: &Vec3| d.dot(cone.axis) >= cone.least_cosine;
+                *ask |= directions.iter().rev().fold(0, |bits, d| bits << 1 | u64::from(inside(d)));
+            }
+            *ask &= !closed;
+        }
+        (ask != BlockedMask::default()).then_some(ask)
+    }
+
     /// How many of some of the point's directions are open.
     fn count_open(&self, blockers: Blockers, indices: std::ops::Range<u32>, scratch: &mut Scratch) -> u32 {
-        let Scratch { local, world } = scratch;
+        let Scratch { local, world, .. } = scratch;
         local.clear();
         self.context.patterns.extend(self.site, indices, local);
         let open =
@@ -83,7 +113,18 @@ impl<'a> Surface<'a> {
     ) -> BlockedMask {
         let PosedPoint { position, normal, tangent } = self.posed;
         world.clear();
-        world.extend(local.iter().map(|d| tangent * d.x + self.bitangent * d.y + normal * d.z));
+        let to_world = |d: &Vec3| tangent * d.x + self.bitangent * d.y + normal * d.z;
+        if *open == ALL {
+            world.extend(local.iter().map(to_world));
+        } else {
+            // Those that are not asked about need not be turned; they must only be directions.
+            world.resize(local.len(), normal);
+            for (word, bits_set) in open.iter().enumerate() {
+                for i in bits(*bits_set).map(|bit| 64 * word + bit).take_while(|i| *i < local.len()) {
+                    world[i] = to_world(&local[i]);
+                }
+            }
+        }
         let origin_world = offset_origin(position, normal);
         let Context { tracer, params, .. } = self.context;
         tracer.occlusion_by(blockers, origin_world, world, params.radius_m, open)
@@ -150,21 +191,15 @@ impl Cluster {
             }
             let still = memory.mask(bit, context.params);
             let open = rays - count_blocked(&still);
-            let reached = open > 0
-                && movers.iter().any(|near| {
-                    near.reaches(surface.posed.position, 0.0)
-                        && near.rises_above(surface.posed.position, surface.posed.normal)
-                });
-            let left = if reached {
-                open - count_blocked(&surface.blocked(Blockers::Movers, &still.map(|w| !w), scratch))
-            } else {
-                open
+            let left = match surface.towards(&movers, &still, scratch) {
+                Some(ask) => open - count_blocked(&surface.blocked(Blockers::Movers, &ask, scratch)),
+                None => open,
             };
             let [rays_still, open_still] = memory.refined_of(bit, [rays, open]);
             self.publish(context, bit, estimate(open_still, rays_still, left, open), traced);
             if known {
                 traced.counts.traced_movers += 1;
-                traced.counts.rays_movers += u64::from(if reached { open } else { 0 });
+                traced.counts.rays_movers += u64::from(open);
             } else {
                 traced.counts.traced_full += 1;
                 traced.counts.rays_full += u64::from(rays);
