@@ -111,6 +111,19 @@ pub(crate) struct VisibilityArgs {
     pub(crate) seed: u32,
 }
 
+/// What a server spends on each of its steps.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub(crate) struct StepArgs {
+    /// Rays a server step may take, spent first on what is seen, on what changes and on what has waited; the rest is done
+    /// in later steps [default: as many as it takes].
+    #[arg(long, value_name = "RAYS")]
+    pub(crate) ray_budget: Option<u64>,
+    /// Rays that a point gets in time while nothing moves near it, from --point-rays to 1024, out of what --ray-budget
+    /// leaves over; 0: no more than --point-rays. Without --ray-budget the first steps are as slow as the start.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) rays_still: u32,
+}
+
 #[derive(Debug, Clone, Args)]
 pub(crate) struct EvalArgs {
     #[command(flatten)]
@@ -146,6 +159,8 @@ pub(crate) struct EvalArgs {
     pub(crate) supersample: Option<u32>,
     #[command(flatten)]
     pub(crate) visibility: VisibilityArgs,
+    #[command(flatten)]
+    pub(crate) step: StepArgs,
     /// Folder for results, report and pictures.
     #[arg(long, value_name = "DIR", default_value = "out/eval")]
     pub(crate) out: PathBuf,
@@ -153,6 +168,7 @@ pub(crate) struct EvalArgs {
     #[arg(long, conflicts_with_all = [
         "scene", "builtin", "detail", "animation", "methods", "frames", "size", "points", "hz", "path", "seconds",
         "reference_rays", "supersample", "radius", "point_rays", "threshold", "seed",
+        "ray_budget", "rays_still",
     ])]
     pub(crate) smoke: bool,
     /// Threads; 0 is one for each core.

@@ -5,7 +5,7 @@ use dapple_scene::Scene;
 use dapple_server::{Progress, Server, ServerConfig};
 use dapple_stream::{PublisherConfig, Recorder, RecordingHeader};
 use dapple_trace::psao::generate::GenerateParams;
-use dapple_trace::psao::update::UpdateParams;
+use dapple_trace::psao::update::{StepInput, UpdateParams};
 
 use crate::args::LightArgs;
 use crate::progress::Bar;
@@ -19,7 +19,7 @@ const STILL_SECONDS: f64 = 10.0;
 
 /// What a server is to do.
 pub(crate) fn server_config(scene: &Scene, args: &LightArgs) -> Result<ServerConfig> {
-    let LightArgs { points, hz, visibility } = args;
+    let LightArgs { points, hz, visibility, step } = args;
     if !(points.is_finite() && *points > 0.0) {
         bail!("--points is {points}, must be above 0");
     }
@@ -33,7 +33,12 @@ pub(crate) fn server_config(scene: &Scene, args: &LightArgs) -> Result<ServerCon
             seed: visibility.seed,
             ..GenerateParams::default()
         },
-        update: UpdateParams { rays: visibility.point_rays, radius_m, threshold: visibility.threshold },
+        update: UpdateParams {
+            rays: visibility.point_rays,
+            rays_still: step.rays_still,
+            radius_m,
+            threshold: visibility.threshold,
+        },
         ..ServerConfig::default()
     })
 }
@@ -90,6 +95,7 @@ pub(crate) fn record(take: &Take<'_>) -> Result<Taken> {
     };
     let (mut recorder, mut bytes) = Recorder::new(&header).context("--name")?;
 
+    let input = StepInput { ray_budget: take.light.step.ray_budget, ..StepInput::default() };
     let ticks = (seconds * hz + 1e-9).floor() as u64;
     let bar = Bar::new("points", 1000);
     let mut server = Server::new(scene.clone(), &config, &|progress| match progress {
@@ -107,7 +113,7 @@ pub(crate) fn record(take: &Take<'_>) -> Result<Taken> {
     let bar = Bar::new("recording", ticks);
     for tick in 1..=ticks {
         let time_s = tick as f64 / hz;
-        if let Some(frame) = server.step(time_s)?.frame {
+        if let Some(frame) = server.step_with(time_s, &input)?.frame {
             frame_bytes += frame.bytes.len() as u64;
             updates += 1;
             bytes.extend(recorder.frame(microseconds(time_s).min(header.duration_us), &frame.bytes)?);

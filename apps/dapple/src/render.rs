@@ -128,6 +128,7 @@ fn light(args: &RenderArgs, loaded: &Loaded) -> Result<(Server, Client)> {
             rays: args.visibility.point_rays,
             radius_m,
             threshold: args.visibility.threshold,
+            ..UpdateParams::default()
         },
         ..ServerConfig::default()
     };

@@ -13,7 +13,7 @@ use dapple_scene::{NoFiles, Scene};
 use dapple_stream::{Applied, FrameKind, Limits};
 use dapple_trace::Tracer;
 use dapple_trace::psao::generate::generate_points;
-use dapple_trace::psao::update::{UpdateParams, Updater};
+use dapple_trace::psao::update::{StepInput, UpdateParams, Updater};
 
 /// Times at which boulders roll and lights sweep, not evenly spaced.
 const TIMES_S: [f64; 6] = [0.2, 0.4, 0.45, 1.0, 3.0, 2.5];
@@ -138,13 +138,13 @@ fn updating_selectively_equals_tracing_every_point() {
     for time_s in times_s {
         let pose = scene.pose(time_s);
         tracer.update(&scene, &pose);
-        let some = selective.step(&scene, &pose, &tracer);
+        let some = selective.step(&scene, &pose, &mut tracer, &StepInput::default());
         let every = thorough.step_all(&scene, &pose, &tracer);
         assert_eq!(some.changes, every.changes, "at {time_s} s");
         assert!(selective.store() == thorough.store());
         changes += some.changes.len();
-        traced += some.traced;
-        all += every.traced;
+        traced += some.counts.traced();
+        all += every.counts.traced();
     }
     assert!(changes > 0 && traced < all / 4, "{changes} changes, {traced} of {all} points traced");
 }

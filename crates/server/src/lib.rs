@@ -13,7 +13,7 @@ use dapple_stream::{Frame, PublishError, Publisher, PublisherConfig};
 use dapple_trace::Tracer;
 use dapple_trace::psao::cuts::find_cuts;
 use dapple_trace::psao::generate::{GenerateError, GenerateParams, GeneratedPoints, generate_points};
-use dapple_trace::psao::update::{UpdateError, UpdateParams, Updater};
+use dapple_trace::psao::update::{StepCounts, StepInput, UpdateError, UpdateParams, Updater};
 
 /// Settings of a server. Each group documents its own ranges and defaults.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,10 +70,12 @@ pub enum ServerError {
 pub struct StepReport {
     /// What subscribers that are up to date must receive; nothing when nothing changed.
     pub frame: Option<Frame>,
-    /// Points traced.
+    /// Points traced because something moved.
     pub traced: u32,
-    /// Rays traced.
+    /// Rays traced, for whatever reason.
     pub rays: u64,
+    /// The same in detail, and what is left to do.
+    pub counts: StepCounts,
     /// Points whose published visibility changed.
     pub changed: u32,
 }
@@ -126,16 +128,24 @@ impl Server {
         Ok(Server { scene, tracer, updater, publisher, dropped_inside })
     }
 
-    /// Brings the scene to `now_s` (seconds) and publishes what changed. Time may run in any direction.
+    /// Brings the scene to `now_s` (seconds) and publishes what changed. Time may run in any direction. Takes as many rays
+    /// as that needs.
     pub fn step(&mut self, now_s: f64) -> Result<StepReport, ServerError> {
+        self.step_with(now_s, &StepInput::default())
+    }
+
+    /// As [`Server::step`] within a budget of rays, spent first where viewers look. What does not fit is published by later
+    /// steps, so a server that runs short falls behind a little everywhere instead of stopping anywhere.
+    pub fn step_with(&mut self, now_s: f64, input: &StepInput<'_>) -> Result<StepReport, ServerError> {
         let pose = self.scene.pose(now_s);
         self.tracer.update(&self.scene, &pose);
-        let report = self.updater.step(&self.scene, &pose, &self.tracer);
+        let report = self.updater.step(&self.scene, &pose, &mut self.tracer, input);
         let frame = self.publisher.publish(self.updater.store())?;
         Ok(StepReport {
             frame,
-            traced: report.traced,
-            rays: report.rays,
+            traced: report.counts.traced(),
+            rays: report.counts.rays(),
+            counts: report.counts,
             changed: report.changes.len() as u32,
         })
     }
@@ -170,7 +180,7 @@ impl Server {
         &self.scene
     }
 
-    /// Bytes held for each point, tracer and scene not counted.
+    /// Bytes held now for each point, tracer and scene not counted ([`Updater::bytes_per_point`]).
     pub fn bytes_per_point(&self) -> f64 {
         self.updater.bytes_per_point()
     }

@@ -10,6 +10,7 @@ use dapple_scene::{
 };
 use dapple_server::{Progress, Server, ServerConfig, ServerError};
 use dapple_stream::{FrameKind, Limits, Subscriber};
+use dapple_trace::psao::update::StepInput;
 
 fn mesh(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Mesh {
     let parts = vec![Part { first_triangle: 0, triangle_count: triangles.len() as u32, material: 0 }];
@@ -125,6 +126,37 @@ fn a_slow_change_is_sent_once_it_adds_up() {
 }
 
 #[test]
+fn a_server_short_of_rays_falls_behind_and_catches_up() {
+    let (mut short, mut free) = (start(&config(0)), start(&config(0)));
+    let input = StepInput { ray_budget: Some(5000), ..StepInput::default() };
+    let (mut behind, mut rays) = (0, 0);
+    for step in 1..=10 {
+        let time_s = f64::from(step) * 0.1;
+        let report = short.step_with(time_s, &input).unwrap();
+        behind = behind.max(report.counts.backlog);
+        rays += report.rays;
+        assert!(report.rays <= 5000);
+        assert_eq!((report.traced, report.rays), (report.counts.traced(), report.counts.rays()));
+        free.step(time_s).unwrap();
+    }
+    assert!(behind > 0 && rays > 40_000, "{behind} points behind, {rays} rays");
+    assert!(short.store() != free.store());
+    let mut subscriber = Subscriber::new(Some(short.scene().hash().0), Limits::default());
+    subscriber.receive(&short.join().unwrap().unwrap().bytes).unwrap();
+    for _ in 0..100 {
+        let report = short.step_with(1.0, &input).unwrap();
+        if let Some(frame) = report.frame {
+            subscriber.receive(&frame.bytes).unwrap();
+        } else if report.counts.backlog == 0 {
+            assert!(short.store() == free.store());
+            assert!(subscriber.store() == Some(free.store()));
+            return;
+        }
+    }
+    panic!("it never caught up");
+}
+
+#[test]
 fn subscribers_are_brought_up_to_date_by_one_snapshot() {
     let mut server = start(&config(4));
     let first = server.join().unwrap().unwrap();
@@ -180,6 +212,7 @@ fn settings_out_of_range_are_refused_by_name() {
     assert!(refused(|c| c.generate.points_per_m2 = 1e9).contains("lower the density"));
     assert!(refused(|c| c.update.rays = 0).contains("rays a point is 0"));
     assert!(refused(|c| c.update.rays = 257).contains("257"));
+    assert!(refused(|c| c.update.rays_still = 32).contains("rays of a point at rest is 32"));
     assert!(refused(|c| c.update.radius_m = -1.0).contains("radius is -1 m"));
 }
 

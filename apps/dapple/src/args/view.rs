@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use dapple_client::viewer::{DebugView, Method};
 
-use super::{SceneChoice, Size, VisibilityArgs};
+use super::{SceneChoice, Size, StepArgs, VisibilityArgs};
 
 pub(crate) const VIEW_EXAMPLES: &str = "\
 Examples:
@@ -35,6 +35,8 @@ pub(crate) struct ViewArgs {
     pub(crate) hz: Option<f64>,
     #[command(flatten)]
     pub(crate) visibility: VisibilityArgs,
+    #[command(flatten)]
+    pub(crate) step: StepArgs,
     /// Effort: points, samples a pixel, shadow maps.
     #[arg(long, value_enum, default_value = "desktop")]
     pub(crate) preset: Preset,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{SceneChoice, VisibilityArgs};
+use super::{SceneChoice, StepArgs, VisibilityArgs};
 
 pub(crate) const RECORD_EXAMPLES: &str = "\
 Examples:
@@ -40,6 +40,8 @@ pub(crate) struct LightArgs {
     pub(crate) hz: f64,
     #[command(flatten)]
     pub(crate) visibility: VisibilityArgs,
+    #[command(flatten)]
+    pub(crate) step: StepArgs,
 }
 
 #[derive(Debug, Clone, Args)]

@@ -1,5 +1,6 @@
 //! `results.json`: the schema is documented in `docs/evaluation.md`.
 
+use dapple_trace::psao::update::StepCounts;
 use serde::{Deserialize, Serialize};
 
 /// Everything one evaluation found.
@@ -61,9 +62,42 @@ pub(crate) struct Row {
     pub(crate) cut_bytes: Option<u64>,
     pub(crate) points: Option<u64>,
     pub(crate) rays: u64,
+    /// Of the server's steps, the start not counted.
+    pub(crate) steps: Option<Steps>,
     pub(crate) server_ms: Option<f64>,
     pub(crate) client_ms: f64,
     pub(crate) frames: Vec<FrameRow>,
+}
+
+/// What the steps of a run did, in points and rays.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+pub(crate) struct Steps {
+    /// Points that motion may have changed.
+    pub(crate) selected: u64,
+    /// Points traced against everything.
+    pub(crate) traced_full: u64,
+    /// Points traced against movers alone.
+    pub(crate) traced_movers: u64,
+    /// Points at rest that got more rays.
+    pub(crate) refined: u64,
+    /// Most points that a step left to later ones.
+    pub(crate) most_backlog: u64,
+    pub(crate) rays_full: u64,
+    pub(crate) rays_movers: u64,
+    pub(crate) rays_refined: u64,
+}
+
+impl Steps {
+    pub(crate) fn add(&mut self, counts: &StepCounts) {
+        self.selected += u64::from(counts.selected);
+        self.traced_full += u64::from(counts.traced_full);
+        self.traced_movers += u64::from(counts.traced_movers);
+        self.refined += u64::from(counts.refined);
+        self.most_backlog = self.most_backlog.max(u64::from(counts.backlog));
+        self.rays_full += counts.rays_full;
+        self.rays_movers += counts.rays_movers;
+        self.rays_refined += counts.rays_refined;
+    }
 }
 
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -76,6 +110,10 @@ pub(crate) struct Params {
     pub(crate) point_rays: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) threshold: Option<u8>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) ray_budget: Option<u64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) rays_still: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) rays_per_pixel: Option<u32>,
 }

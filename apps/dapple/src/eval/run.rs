@@ -11,10 +11,12 @@ use dapple_server::{Progress, Server, ServerConfig};
 use dapple_stream::Limits;
 use dapple_trace::Tracer;
 use dapple_trace::psao::generate::{GenerateParams, generate_points};
-use dapple_trace::psao::update::UpdateParams;
+use dapple_trace::psao::update::{ConvexVolume, StepInput, UpdateParams};
 use dapple_trace::rtao::{RtaoParams, trace_visibility_with_progress};
 
-use super::results::{FrameRow, Machine, Params, PooledError, Results, Row, RunInfo, SceneInfo, commit};
+use super::results::{
+    FrameRow, Machine, Params, PooledError, Results, Row, RunInfo, SceneInfo, Steps, commit,
+};
 use super::settings::Settings;
 use crate::args::Method;
 use crate::picture::{Compared, Shown, sites};
@@ -31,13 +33,14 @@ struct Pair {
     delta_bytes: u64,
     snapshot_bytes: u64,
     rays: u64,
+    steps: Steps,
     server_seconds: f64,
     apply_seconds: f64,
 }
 
 impl Pair {
     /// Ticks up to and including `until_s`; the client takes every frame.
-    fn advance(&mut self, until_s: f64) -> Result<()> {
+    fn advance(&mut self, until_s: f64, settings: &Settings) -> Result<()> {
         loop {
             let tick_s = (self.ticks + 1) as f64 / self.hz;
             // The sum of many ticks must not lose the last one to rounding.
@@ -45,10 +48,13 @@ impl Pair {
                 return Ok(());
             }
             self.ticks += 1;
+            let interest = self.interest(tick_s, settings);
+            let input = StepInput { ray_budget: settings.step.ray_budget, interest: &interest };
             let start = Instant::now();
-            let report = self.server.step(tick_s)?;
+            let report = self.server.step_with(tick_s, &input)?;
             self.server_seconds += start.elapsed().as_secs_f64();
             self.rays += report.rays;
+            self.steps.add(&report.counts);
             let start = Instant::now();
             if let Some(frame) = &report.frame {
                 self.delta_bytes += frame.bytes.len() as u64;
@@ -56,6 +62,20 @@ impl Pair {
             }
             self.apply_seconds += start.elapsed().as_secs_f64();
         }
+    }
+
+    /// What the viewer sees by the next tick, where a budget asks for it.
+    fn interest(&self, tick_s: f64, settings: &Settings) -> Vec<ConvexVolume> {
+        if settings.step.ray_budget.is_none() {
+            return Vec::new();
+        }
+        let scene = self.server.scene();
+        let aspect = settings.size.width as f32 / settings.size.height as f32;
+        let frustum = |time_s: f64| {
+            let camera = settings.path.camera(scene, &scene.pose_undeformed(time_s));
+            ConvexVolume::frustum(&camera, aspect, f32::INFINITY, settings.radius_m)
+        };
+        vec![frustum(tick_s), frustum(tick_s + 1.0 / self.hz)]
     }
 }
 
@@ -89,7 +109,7 @@ pub(super) fn evaluate(loaded: &Loaded, settings: &Settings, out: &Path) -> Resu
     for (number, &time_s) in settings.frame_times_s.iter().enumerate() {
         bar.message(&format!("frame {} of {frames}: server", number + 1));
         for pair in &mut pairs {
-            pair.advance(time_s)?;
+            pair.advance(time_s, settings)?;
         }
         bar.message(&format!("frame {} of {frames}: truth", number + 1));
         let pose = scene.pose(time_s);
@@ -114,7 +134,7 @@ pub(super) fn evaluate(loaded: &Loaded, settings: &Settings, out: &Path) -> Resu
     }
     bar.message("server to the end of the path");
     for pair in &mut pairs {
-        pair.advance(settings.seconds)?;
+        pair.advance(settings.seconds, settings)?;
     }
     drop(bar);
     let rows = lines.into_iter().map(|line| line.finish(settings, &pairs)).collect();
@@ -160,6 +180,7 @@ fn start_servers(loaded: &Loaded, settings: &Settings, pose: &Pose, tracer: &Tra
             rays: settings.point_rays,
             radius_m: settings.radius_m,
             threshold: settings.threshold,
+            rays_still: settings.step.rays_still,
         };
         let config = ServerConfig { generate, update, ..ServerConfig::default() };
         let bar = Bar::new(&format!("points, N = {points_per_m2}"), scene.instances.len() as u64);
@@ -197,6 +218,7 @@ fn start_servers(loaded: &Loaded, settings: &Settings, pose: &Pose, tracer: &Tra
                 delta_bytes: 0,
                 snapshot_bytes,
                 rays,
+                steps: Steps::default(),
                 server_seconds: 0.0,
                 apply_seconds: 0.0,
             });
@@ -297,6 +319,8 @@ impl Line {
             hz: pair.map(|p| p.hz),
             point_rays: pair.map(|_| settings.point_rays),
             threshold: pair.map(|_| settings.threshold),
+            ray_budget: pair.and(settings.step.ray_budget),
+            rays_still: pair.map(|_| settings.step.rays_still).filter(|rays| *rays > 0),
             rays_per_pixel: match self.method {
                 Method::Rtao { rays } => Some(rays),
                 _ => None,
@@ -317,6 +341,7 @@ impl Line {
             cut_bytes: pair.map(|p| p.server.cut_bytes() as u64),
             points: pair.map(|p| p.server.store().layout().len() as u64),
             rays: self.rays + pair.map_or(0, |p| p.rays),
+            steps: pair.map(|p| p.steps),
             server_ms: pair.filter(|p| p.ticks > 0).map(|p| per_tick(p.server_seconds, p)),
             client_ms: 1e3 * self.reconstruct_seconds / count + apply_ms,
             frames: self.frames,

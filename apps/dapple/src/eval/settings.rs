@@ -3,7 +3,7 @@
 use anyhow::{Result, bail};
 use dapple_scene::{CameraPath, Scene};
 
-use crate::args::{EvalArgs, Method, Size};
+use crate::args::{EvalArgs, Method, Size, StepArgs};
 use crate::source::{self, Loaded};
 
 /// The scene and detail of an evaluation without arguments.
@@ -32,6 +32,7 @@ pub(super) struct Settings {
     pub(super) point_rays: u32,
     pub(super) threshold: u8,
     pub(super) seed: u32,
+    pub(super) step: StepArgs,
 }
 
 impl Settings {
@@ -67,6 +68,7 @@ impl Settings {
             point_rays: args.visibility.point_rays,
             threshold: args.visibility.threshold,
             seed: args.visibility.seed,
+            step: args.step,
         };
         settings.check(frames, args)?;
         Ok(settings)

@@ -7,6 +7,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use dapple_scene::Scene;
 use dapple_server::{Progress, Server, ServerConfig};
+use dapple_trace::psao::update::StepInput;
 
 /// What is asked of the server.
 enum Request {
@@ -50,7 +51,12 @@ pub(super) struct Live {
 
 impl Live {
     /// Starts a server. It ends by itself once this is dropped.
-    pub(super) fn start(scene: Arc<Scene>, config: ServerConfig, hz: f64) -> Result<Live> {
+    pub(super) fn start(
+        scene: Arc<Scene>,
+        config: ServerConfig,
+        hz: f64,
+        ray_budget: Option<u64>,
+    ) -> Result<Live> {
         let (requests, asked) = channel();
         let (answers, replies) = channel();
         // One core is left to the picture.
@@ -61,7 +67,7 @@ impl Live {
             .context("cannot start the server's threads")?;
         std::thread::Builder::new()
             .name("light".to_owned())
-            .spawn(move || pool.install(move || serve(&scene, &config, &asked, &answers)))
+            .spawn(move || pool.install(move || serve(&scene, &config, ray_budget, &asked, &answers)))
             .context("cannot start the server's thread")?;
         Ok(Live {
             requests,
@@ -168,12 +174,19 @@ impl Live {
 }
 
 /// The server's thread: until nobody asks or listens any more.
-fn serve(scene: &Arc<Scene>, config: &ServerConfig, asked: &Receiver<Request>, answers: &Sender<Reply>) {
+fn serve(
+    scene: &Arc<Scene>,
+    config: &ServerConfig,
+    ray_budget: Option<u64>,
+    asked: &Receiver<Request>,
+    answers: &Sender<Reply>,
+) {
     let progress = |progress| {
         let _ = answers.send(Reply::Progress(progress));
     };
     // Who listens no more is no error.
-    let ended = run(Server::new(scene.clone(), config, &progress), asked, answers);
+    let input = StepInput { ray_budget, ..StepInput::default() };
+    let ended = run(Server::new(scene.clone(), config, &progress), &input, asked, answers);
     if let Err(error) = ended {
         let _ = answers.send(Reply::Failed(format!("{error:#}")));
     }
@@ -181,6 +194,7 @@ fn serve(scene: &Arc<Scene>, config: &ServerConfig, asked: &Receiver<Request>, a
 
 fn run(
     server: Result<Server, dapple_server::ServerError>,
+    input: &StepInput<'_>,
     asked: &Receiver<Request>,
     answers: &Sender<Reply>,
 ) -> Result<()> {
@@ -193,7 +207,7 @@ fn run(
             Request::Join => server.join()?,
             Request::Time(time_s) => {
                 let start = Instant::now();
-                let report = server.step(time_s)?;
+                let report = server.step_with(time_s, input)?;
                 let stepped =
                     Reply::Stepped { seconds: start.elapsed().as_secs_f64(), traced: report.traced };
                 if let Some(frame) = report.frame {

@@ -66,6 +66,7 @@ fn open(args: &ViewArgs) -> Result<Opening> {
         points: quality.points_per_m2,
         hz: args.hz.unwrap_or(DEFAULT_HZ),
         visibility: args.visibility.clone(),
+        step: args.step,
     };
     let (scene, title, feed) = match &args.url {
         Some(url) => {

@@ -232,7 +232,8 @@ impl Show {
 pub(super) fn start_server(scene: &Arc<Scene>, light: &LightArgs, first_group: u64) -> Result<Feed> {
     let config = server_config(scene, light)?;
     let publish = PublisherConfig { first_group, ..config.publish };
-    Ok(Feed::Live(Live::start(scene.clone(), ServerConfig { publish, ..config }, light.hz)?))
+    let config = ServerConfig { publish, ..config };
+    Ok(Feed::Live(Live::start(scene.clone(), config, light.hz, light.step.ray_budget)?))
 }
 
 fn viewer_config(quality: &Quality, format: wgpu::TextureFormat) -> ViewerConfig {

@@ -34,7 +34,7 @@ mod movers;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
-mod timing;
+pub(crate) mod timing;
 
 use dapple_scene::glam::Vec3;
 

@@ -10,7 +10,7 @@ use crate::sampling::{fixed_pattern, hash, orthonormal_basis};
 use crate::test_support::{Random, cube, deform, joined, scene, scene_of, sphere};
 
 /// This thread's CPU time in seconds where the system tells it, so that others on the machine count less.
-fn cpu_seconds() -> f64 {
+pub(crate) fn cpu_seconds() -> f64 {
     static START: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
     let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let nanoseconds = told.and_then(|s| s.split_whitespace().next().and_then(|n| n.parse::<f64>().ok()));

@@ -17,7 +17,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 pub use anchor::Anchor;
-pub(crate) use anchor::pose_anchor;
+pub(crate) use anchor::{PosedPoint, pose_anchor};
 use eliminate::{Candidate, eliminate, maximum_radius};
 
 use crate::sampling::{fixed_pattern, hash, orthonormal_basis};

@@ -1,29 +1,45 @@
 //! Server update ([Neff2023] sec. 3.3): traces the points that a mover can affect, and reports what changed.
 //!
-//! Takes the scene's pose and a tracer brought up to it; returns the [`Change`]s above the threshold.
+//! Takes the scene's pose and a tracer brought up to it; returns the [`Change`](dapple_store::points::Change)s above
+//! the threshold. A step has two halves: [`Updater::select`] finds and ranks, [`Updater::trace_selected`] traces.
 
 mod clusters;
+mod interest;
+mod motion;
 mod patterns;
+mod report;
+mod select;
+mod trace;
+
 #[cfg(test)]
 mod tests;
 
-use std::sync::Arc;
-
-use dapple_scene::{Aabb, Pose, Scene};
-use dapple_store::points::{Change, PointLayout, PointStore};
+use dapple_scene::{Pose, Scene};
+use dapple_store::points::PointStore;
 use glam::Vec3;
 use rayon::prelude::*;
 
 use super::generate::{Anchor, GeneratedPoints};
-use crate::{Tracer, count_blocked, offset_origin};
-use clusters::Clusters;
+use crate::Tracer;
+use clusters::Cluster;
+pub use interest::ConvexVolume;
+use motion::Motion;
 use patterns::Patterns;
+pub use report::{StepCounts, StepInput, UpdateReport};
+use trace::{Context, Scratch, Traced};
+
+/// Most rays of a point at rest.
+const MAX_RAYS_STILL: u32 = 1024;
 
 /// How visibility is traced and when it counts as changed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UpdateParams {
     /// Rays a point, 1 … 256, always in the same directions relative to the point's surface. Default 64.
     pub rays: u32,
+    /// Rays that a point gets in time when no mover is near, `rays` … 1024; 0 (default): no more than `rays`. Steps double
+    /// its rays one point at a time, with what their budget leaves over; without a budget all points at once, which takes
+    /// as long as the start.
+    pub rays_still: u32,
     /// Occlusion distance in metres, > 0. Default 0.6 ([Neff2023] sec. 4).
     pub radius_m: f32,
     /// A point is sent when its visibility (0 … 255) differs by more than this from what was last sent. Default 4.
@@ -32,32 +48,50 @@ pub struct UpdateParams {
 
 impl Default for UpdateParams {
     fn default() -> Self {
-        UpdateParams { rays: 64, radius_m: 0.6, threshold: 4 }
+        UpdateParams { rays: 64, rays_still: 0, radius_m: 0.6, threshold: 4 }
     }
 }
 
-/// What one step did.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct UpdateReport {
-    /// Points whose published visibility changes, ascending.
-    pub changes: Vec<Change>,
-    /// Points traced.
-    pub traced: u32,
-    /// Rays traced.
-    pub rays: u64,
+impl UpdateParams {
+    fn check(&self) -> Result<(), UpdateError> {
+        let UpdateParams { rays, rays_still, radius_m, .. } = *self;
+        if !(1..=256).contains(&rays) {
+            return Err(UpdateError::BadRays(rays));
+        }
+        if rays_still != 0 && !(rays..=MAX_RAYS_STILL).contains(&rays_still) {
+            return Err(UpdateError::BadRaysStill { rays_still, rays });
+        }
+        if !(radius_m.is_finite() && radius_m > 0.0) {
+            return Err(UpdateError::BadRadius(radius_m));
+        }
+        Ok(())
+    }
+
+    /// Whether points at rest get more rays.
+    fn refines(&self) -> bool {
+        self.rays_still > self.rays
+    }
+
+    fn mask_words(&self) -> usize {
+        self.rays.div_ceil(64) as usize
+    }
 }
 
-/// The server's memory of all points: anchors and the visibility that was last published.
+/// The server's memory of all points: anchors, the visibility that was last published, and what still instances block.
 #[derive(Clone, Debug)]
 pub struct Updater {
     params: UpdateParams,
     anchors: Vec<Anchor>,
     store: PointStore,
     patterns: Patterns,
-    clusters: Clusters,
-    /// As of the last step.
-    pose: Pose,
-    bounds_world: Vec<Aabb>,
+    clusters: Vec<Cluster>,
+    motion: Motion,
+    /// Number of the last step; wraps.
+    step: u32,
+    /// There is work even if nothing moves.
+    restless: bool,
+    /// Of the step that was selected.
+    counts: StepCounts,
 }
 
 /// Why an updater could not be made.
@@ -66,6 +100,16 @@ pub enum UpdateError {
     /// Number of rays out of range.
     #[error("rays a point is {0}, must be 1 to 256")]
     BadRays(u32),
+    /// Number of rays at rest out of range.
+    #[error(
+        "rays of a point at rest is {rays_still}, must be 0 (no more than others) or {rays} to {MAX_RAYS_STILL}"
+    )]
+    BadRaysStill {
+        /// What it was.
+        rays_still: u32,
+        /// Rays of any point.
+        rays: u32,
+    },
     /// Radius out of range.
     #[error("occlusion radius is {0} m, must be positive and finite")]
     BadRadius(f32),
@@ -81,31 +125,26 @@ impl Updater {
         params: UpdateParams,
         progress: &(dyn Fn(usize) + Sync),
     ) -> Result<Updater, UpdateError> {
-        if !(1..=256).contains(&params.rays) {
-            return Err(UpdateError::BadRays(params.rays));
-        }
-        if !(params.radius_m.is_finite() && params.radius_m > 0.0) {
-            return Err(UpdateError::BadRadius(params.radius_m));
-        }
-        let GeneratedPoints { layout, anchors, .. } = points;
-        let patterns = Patterns::new(params.rays);
-        let context =
-            Context { scene, pose, tracer, layout: &layout, anchors: &anchors, patterns: &patterns, params };
-        let done = std::sync::atomic::AtomicUsize::new(0);
-        let all: Vec<u32> = (0..anchors.len() as u32).collect();
-        let visibility: Vec<u8> = all
-            .par_chunks(1024)
-            .flat_map_iter(|chunk| {
-                let values = context.trace(chunk);
-                progress(chunk.len() + done.fetch_add(chunk.len(), std::sync::atomic::Ordering::Relaxed));
-                values
-            })
-            .collect();
-        let store = PointStore::new(layout, visibility).expect("one value was traced for each point");
-        let mut clusters = Clusters::new(store.layout());
-        clusters.refresh(scene, pose, &anchors, |_| true);
-        let bounds_world = instance_bounds(scene, pose);
-        Ok(Updater { params, anchors, store, patterns, clusters, pose: pose.clone(), bounds_world })
+        params.check()?;
+        let GeneratedPoints { layout, mut anchors, .. } = points;
+        anchors.shrink_to_fit();
+        let mut clusters = Cluster::all(&layout);
+        clusters.par_iter_mut().for_each(|c| c.settle_down(scene, pose, &anchors));
+        let mut updater = Updater {
+            params,
+            store: PointStore::new(layout, vec![0; anchors.len()]).expect("there is a value for each point"),
+            anchors,
+            patterns: Patterns::new(params.rays),
+            clusters,
+            motion: Motion::new(scene, pose, params.radius_m),
+            step: 0,
+            restless: params.refines(),
+            counts: StepCounts::default(),
+        };
+        let visibility = updater.trace_all(scene, pose, tracer, params.rays, progress);
+        updater.store = PointStore::new(updater.store.layout().clone(), visibility)
+            .expect("one value was traced for each point");
+        Ok(updater)
     }
 
     /// What has been published: the state every subscriber converges to.
@@ -123,158 +162,127 @@ impl Updater {
             .collect()
     }
 
-    /// Bytes held for each point: anchor, position, normal, value, and its share of the clusters.
+    /// Bytes held now for each point, by capacity and with everything: layout, anchors, values, what is remembered of still
+    /// instances, and the points' share of the tables that all of them use. It grows as movers come near more points.
     pub fn bytes_per_point(&self) -> f64 {
-        let points = self.anchors.len().max(1) as f64;
-        let fixed = size_of::<Anchor>() + size_of::<[u32; 3]>() + 2 + 1;
-        fixed as f64 + self.clusters.bytes() as f64 / points
+        let sets = self.store.layout().sets();
+        let layout: usize = sets
+            .iter()
+            .map(|set| {
+                size_of_val(set)
+                    + set.positions.capacity() * size_of::<[u32; 3]>()
+                    + set.normals.capacity() * size_of::<[u8; 2]>()
+            })
+            .sum();
+        let bytes = size_of::<Updater>()
+            + layout
+            + self.store.visibility().len()
+            + self.anchors.capacity() * size_of::<Anchor>()
+            + self.clusters.iter().map(Cluster::bytes).sum::<usize>()
+            + (self.clusters.capacity() - self.clusters.len()) * size_of::<Cluster>()
+            + self.patterns.bytes()
+            + self.motion.bytes();
+        bytes as f64 / self.anchors.len().max(1) as f64
     }
 
-    /// Traces what may have changed between the last step's pose and this one. `tracer` must be up to date with `pose`.
-    pub fn step(&mut self, scene: &Scene, pose: &Pose, tracer: &Tracer) -> UpdateReport {
-        let moved = moved_instances(&self.pose, pose);
-        if !moved.contains(&true) {
-            self.pose = pose.clone();
-            return UpdateReport::default();
-        }
-        // Both ends of the motion can change a point: what arrived now occludes, what left no longer does.
-        let mut swept = Vec::new();
-        for (instance, _) in moved.iter().enumerate().filter(|(_, moved)| **moved) {
-            let bounds_world = scene.instance_bounds_world(pose, instance);
-            if scene.instances[instance].casts {
-                swept.push(self.bounds_world[instance]);
-                swept.push(bounds_world);
-            }
-            self.bounds_world[instance] = bounds_world;
-        }
-        self.clusters.refresh(scene, pose, &self.anchors, |i| moved[i]);
-        let reach = reach_m(self.params.radius_m, &swept);
-        let candidates = self.clusters.select(scene, pose, &self.anchors, &moved, &swept, reach);
-        let report = self.trace_and_publish(scene, pose, tracer, &candidates);
-        self.pose = pose.clone();
-        report
-    }
-
-    /// Traces all points, whether or not anything moved: what [`Updater::step`] must agree with.
-    pub fn step_all(&mut self, scene: &Scene, pose: &Pose, tracer: &Tracer) -> UpdateReport {
-        let all: Vec<u32> = (0..self.anchors.len() as u32).collect();
-        self.clusters.refresh(scene, pose, &self.anchors, |_| true);
-        self.bounds_world = instance_bounds(scene, pose);
-        let report = self.trace_and_publish(scene, pose, tracer, &all);
-        self.pose = pose.clone();
-        report
-    }
-
-    fn trace_and_publish(
+    /// Traces what may have changed between the last step's pose and this one, within the budget; what does not fit waits.
+    /// `tracer` must be up to date with `pose`; it is told which instances count as movers.
+    ///
+    /// Without a budget the result is that of tracing everything ([`Updater::step_all`]), to the bit, as long as points at
+    /// rest get no more rays than others.
+    pub fn step(
         &mut self,
         scene: &Scene,
         pose: &Pose,
-        tracer: &Tracer,
-        points: &[u32],
+        tracer: &mut Tracer,
+        input: &StepInput<'_>,
     ) -> UpdateReport {
-        let layout = self.store.layout().clone();
+        self.select(scene, pose, tracer, input);
+        self.trace_selected(scene, pose, tracer)
+    }
+
+    /// The second half of [`Updater::step`], with the same pose and tracer as [`Updater::select`].
+    pub fn trace_selected(&mut self, scene: &Scene, pose: &Pose, tracer: &Tracer) -> UpdateReport {
         let context = Context {
             scene,
             pose,
             tracer,
-            layout: &layout,
             anchors: &self.anchors,
             patterns: &self.patterns,
-            params: self.params,
+            params: &self.params,
+            movers: self.motion.casting_movers(scene),
+            published: self.store.visibility(),
         };
-        let published = self.store.visibility();
-        let changes: Vec<Change> = points
-            .par_chunks(256)
-            .flat_map_iter(|chunk| {
-                let values = context.trace(chunk);
-                let changed = chunk.iter().zip(values).filter(|&(&point, visibility)| {
-                    visibility.abs_diff(published[point as usize]) > self.params.threshold
-                });
-                changed.map(|(&point, visibility)| Change { point, visibility }).collect::<Vec<_>>()
-            })
+        let traced: Vec<Traced> = self
+            .clusters
+            .par_iter_mut()
+            .filter(|cluster| cluster.selected | cluster.refining != 0)
+            .map(|cluster| cluster.trace(&context))
             .collect();
-        self.store.apply(&changes).expect("every candidate is a point of the store");
-        UpdateReport {
-            changes,
-            traced: points.len() as u32,
-            rays: points.len() as u64 * u64::from(self.params.rays),
+        let mut report = UpdateReport { changes: Vec::new(), counts: std::mem::take(&mut self.counts) };
+        for traced in traced {
+            report.counts.add(&traced.counts);
+            report.changes.extend(traced.changes);
         }
+        self.store.apply(&report.changes).expect("every traced point is a point of the store");
+        report
     }
-}
 
-/// What tracing a point needs to know.
-struct Context<'a> {
-    scene: &'a Scene,
-    pose: &'a Pose,
-    tracer: &'a Tracer,
-    layout: &'a Arc<PointLayout>,
-    anchors: &'a [Anchor],
-    patterns: &'a Patterns,
-    params: UpdateParams,
-}
-
-impl Context<'_> {
-    /// Visibility of each of `points` (ascending), 255 = open.
-    fn trace(&self, points: &[u32]) -> Vec<u8> {
-        let sets = self.layout.sets();
-        let mut set = 0;
-        let mut directions_world = Vec::with_capacity(self.params.rays as usize);
-        let mut values = Vec::with_capacity(points.len());
-        for &point in points {
-            while set + 1 < sets.len() && sets[set + 1].first <= point {
-                set += 1;
-            }
-            let instance = sets[set].instance;
-            let anchor = &self.anchors[point as usize];
-            let Some(posed) = anchor.pose(self.scene, self.pose, instance as usize) else {
-                // A triangle that collapsed while moving shows nothing; open is the neutral value.
-                values.push(255);
-                continue;
-            };
-            let bitangent = posed.normal.cross(posed.tangent);
-            directions_world.clear();
-            directions_world.extend(
-                self.patterns
-                    .of(anchor.site(instance))
-                    .iter()
-                    .map(|d| posed.tangent * d.x + bitangent * d.y + posed.normal * d.z),
-            );
-            let origin_world = offset_origin(posed.position, posed.normal);
-            let blocked = self.tracer.occlusion(origin_world, &directions_world, self.params.radius_m);
-            values.push(quantize(self.params.rays - count_blocked(&blocked), self.params.rays));
+    /// Traces all points anew, whether or not anything moved, each with the rays that it has at rest: what steps must come
+    /// to once nothing moves, and what a step without a budget must agree with if rest adds no rays.
+    pub fn step_all(&mut self, scene: &Scene, pose: &Pose, tracer: &Tracer) -> UpdateReport {
+        let observed = self.observe(scene, pose);
+        self.mark(scene, pose, &observed);
+        for cluster in &mut self.clusters {
+            (cluster.dirty, cluster.waiting) = (0, 0);
         }
-        values
+        self.restless = self.params.refines();
+        let rays = self.params.rays.max(self.params.rays_still);
+        let values = self.trace_all(scene, pose, tracer, rays, &|_| ());
+        let published = self.store.visibility().iter().zip(values);
+        let changed = (0..).zip(published).filter(|(_, (a, b))| a.abs_diff(*b) > self.params.threshold);
+        let changes: Vec<_> = changed
+            .map(|(point, (_, visibility))| dapple_store::points::Change { point, visibility })
+            .collect();
+        self.store.apply(&changes).expect("every traced point is a point of the store");
+        let points = self.anchors.len() as u32;
+        let counts = StepCounts {
+            selected: points,
+            traced_full: points,
+            rays_full: u64::from(points) * u64::from(rays),
+            ..StepCounts::default()
+        };
+        UpdateReport { changes, counts }
     }
-}
 
-/// The share of open rays as 0 … 255, rounded.
-fn quantize(open: u32, rays: u32) -> u8 {
-    ((open * 255 + rays / 2) / rays) as u8
-}
-
-fn instance_bounds(scene: &Scene, pose: &Pose) -> Vec<Aabb> {
-    (0..scene.instances.len()).into_par_iter().map(|i| scene.instance_bounds_world(pose, i)).collect()
-}
-
-/// For each instance, whether it is placed or bent differently.
-fn moved_instances(before: &Pose, after: &Pose) -> Vec<bool> {
-    let differs = |(a, b): (&dapple_scene::PosedInstance, &dapple_scene::PosedInstance)| {
-        a.world_from_mesh != b.world_from_mesh
-            || match (&a.deformed, &b.deformed) {
-                (None, None) => false,
-                (Some(a), Some(b)) => !Arc::ptr_eq(a, b) && a.positions != b.positions,
-                _ => true,
-            }
-    };
-    before.instances.iter().zip(&after.instances).map(differs).collect()
-}
-
-/// How far from a mover's bounds a point can be and still see it: the radius and the lift of ray origins, with a margin for rounding.
-fn reach_m(radius_m: f32, swept: &[Aabb]) -> f32 {
-    let magnitude = swept
-        .iter()
-        .filter(|b| !b.is_empty())
-        .map(|b| b.min.abs().max(b.max.abs()).max_element())
-        .fold(0.0f32, f32::max);
-    radius_m * 1.001 + 1e-3 * (1.0 + magnitude * 0.01)
+    /// Visibility of every point, nothing remembered.
+    fn trace_all(
+        &self,
+        scene: &Scene,
+        pose: &Pose,
+        tracer: &Tracer,
+        rays: u32,
+        progress: &(dyn Fn(usize) + Sync),
+    ) -> Vec<u8> {
+        let (anchors, params, published) = (&self.anchors[..], &self.params, self.store.visibility());
+        let (patterns, movers) = (&self.patterns, Vec::new());
+        let context = Context { scene, pose, tracer, anchors, patterns, params, movers, published };
+        let done = std::sync::atomic::AtomicUsize::new(0);
+        self.clusters
+            .par_chunks(16)
+            .flat_map_iter(|chunk| {
+                let mut scratch = Scratch::default();
+                let mut values = Vec::new();
+                for cluster in chunk {
+                    let anchors = &anchors[cluster.range()];
+                    let traced =
+                        anchors.iter().map(|a| context.visibility(a, cluster.instance, rays, &mut scratch));
+                    values.extend(traced);
+                }
+                let before = done.fetch_add(values.len(), std::sync::atomic::Ordering::Relaxed);
+                progress(before + values.len());
+                values
+            })
+            .collect()
+    }
 }

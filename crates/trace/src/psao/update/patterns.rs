@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::sampling::fixed_pattern;
+use crate::sampling::{extend_pattern, hash};
 
 /// A table of cosine-distributed patterns; a point's site number chooses one.
 ///
@@ -19,18 +19,28 @@ const PATTERNS: u32 = 256;
 impl Patterns {
     pub(super) fn new(rays: u32) -> Patterns {
         let mut directions = Vec::with_capacity((PATTERNS * rays) as usize);
-        let mut one = Vec::new();
         for pattern in 0..PATTERNS {
-            one.clear();
-            fixed_pattern(rays, crate::sampling::hash(0x9a77, u64::from(pattern), 0), &mut one);
-            directions.extend_from_slice(&one);
+            extend_pattern(0..rays, seed(pattern), &mut directions);
         }
         Patterns { rays: rays as usize, directions }
     }
 
-    /// Directions around +Z in the point's surface frame.
+    /// The first directions around +Z in the point's surface frame.
     pub(super) fn of(&self, site: u32) -> &[Vec3] {
         let pattern = (site % PATTERNS) as usize;
         &self.directions[pattern * self.rays..(pattern + 1) * self.rays]
     }
+
+    /// Those of some indices, of which the first ones are those of [`Patterns::of`].
+    pub(super) fn extend(&self, site: u32, indices: std::ops::Range<u32>, out: &mut Vec<Vec3>) {
+        extend_pattern(indices, seed(site % PATTERNS), out);
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        self.directions.capacity() * size_of::<Vec3>()
+    }
+}
+
+fn seed(pattern: u32) -> u32 {
+    hash(0x9a77, u64::from(pattern), 0)
 }

@@ -1,0 +1,53 @@
+//! What viewers see: where rays are spent first.
+
+use dapple_scene::{Aabb, PosedCamera, Projection};
+use glam::{Vec3, Vec4};
+
+/// A convex part of the world: what lies on the inner side of all planes. Without planes it is the whole world.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ConvexVolume {
+    /// Inside is where `xyz · position_world + w ≥ 0`; metres if `xyz` has unit length.
+    pub planes: Vec<Vec4>,
+}
+
+impl ConvexVolume {
+    /// What a camera sees in a picture of that aspect ratio (width / height), up to `far_m` metres (infinity: as far as it
+    /// sees). Its sides stand `margin_m` metres off, for what comes into view before the next step.
+    pub fn frustum(camera: &PosedCamera, aspect: f32, far_m: f32, margin_m: f32) -> ConvexVolume {
+        let clip_from_view = camera.clip_from_view(aspect);
+        let (x, y, w) = (clip_from_view.row(0), clip_from_view.row(1), clip_from_view.row(3));
+        let (near_m, far_m) = match camera.projection {
+            Projection::Perspective { near, .. } => (near, far_m),
+            Projection::Orthographic { near, far, .. } => (near, far.min(far_m)),
+        };
+        // The camera looks along −Z.
+        let mut planes_view = vec![w + x, w - x, w + y, w - y, Vec4::new(0.0, 0.0, -1.0, -near_m)];
+        if far_m.is_finite() {
+            planes_view.push(Vec4::new(0.0, 0.0, 1.0, far_m));
+        }
+        let view_from_world = camera.view_from_world();
+        let planes = planes_view.into_iter().map(|plane| {
+            let plane = plane / plane.truncate().length();
+            let normal =
+                Vec3::from(view_from_world.matrix3.transpose() * glam::Vec3A::from(plane.truncate()));
+            let offset = plane.w + plane.truncate().dot(view_from_world.translation.into());
+            normal.extend(offset + margin_m)
+        });
+        ConvexVolume { planes: planes.collect() }
+    }
+
+    /// Whether a part of the box may lie inside; perhaps yes too often, never no when it does.
+    pub fn touches(&self, bounds_world: &Aabb) -> bool {
+        self.planes.iter().all(|plane| {
+            let normal = plane.truncate();
+            let innermost = Vec3::select(normal.cmpge(Vec3::ZERO), bounds_world.max, bounds_world.min);
+            let outside = normal.dot(innermost) + plane.w < 0.0;
+            !outside
+        })
+    }
+}
+
+/// Whether anyone sees the box; everything is seen if there are no volumes.
+pub(super) fn is_seen(interest: &[ConvexVolume], bounds_world: &Aabb) -> bool {
+    interest.is_empty() || interest.iter().any(|volume| volume.touches(bounds_world))
+}
