@@ -55,6 +55,29 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
     let mut empty = Publisher::new([0; 32], PublisherConfig::default());
     frame("empty", &publish(&mut empty, &Input(&[]).store()));
 
+    // Soups of any numbers, of small ones and of very few different ones; mutations do the rest.
+    for (coarse, name) in ["any-bits", "small", "few"].into_iter().enumerate() {
+        let mut random = Random(coarse as u64);
+        let mut bytes = vec![coarse as u8, 40, 0];
+        // Exponents near 1 make triangles that meet.
+        let number = |random: &mut Random| match coarse {
+            0 => ((random.below(4000) as f32 - 2000.0) / 700.0).to_le_bytes().to_vec(),
+            1 => vec![random.bits() as u8],
+            _ => vec![random.below(5) as u8, 0],
+        };
+        for _ in 0..41 * 9 {
+            bytes.extend(number(&mut random));
+        }
+        bytes.extend([0, 0, 2, 3, 0]);
+        while bytes.len() < 2600 {
+            bytes.extend(number(&mut random));
+            bytes.extend(number(&mut random));
+            bytes.extend(number(&mut random));
+            bytes.extend([255, 66, 0]);
+        }
+        seeds.push(("triangle_soup", name.to_owned(), bytes));
+    }
+
     // A store of one set of two points, then calls: random ones, and every one once.
     let start = [5, 2, 1, 0, 0, 0, 2, 0, 1, 2, 3, 9, 1, 4, 5, 6, 9, 1, 0, 32, 100, 200];
     for seed in 0..6 {

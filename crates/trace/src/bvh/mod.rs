@@ -1,13 +1,16 @@
-//! Two levels of bounding volume hierarchies and the queries on them.
+//! Two levels of bounding volume hierarchies and the queries on them. `README.md` tells how it works and why.
 //!
 //! - **Lower level**: one tree for each mesh, in mesh space, shared by its rigid instances; one of its own for each
-//!   deformed instance, refitted when it moves.
+//!   deformed instance, refitted when it moves and built anew when that no longer pays.
 //! - **Upper level**: two small trees over the instances' boxes in the world: of those that move, built anew each
 //!   update, and of all others.
 //!
-//! Trees are eight wide with boxes side by side in arrays, built by a binned surface-area heuristic. Triangles are
-//! tested by the watertight algorithm of \[Woop2013\]: rays do not slip through shared edges or corners of one mesh.
-//! Both faces block. Results do not depend on the number of threads.
+//! Every answer is that of one test of a ray and a triangle ([`Tracer::occluded`] and all others; \[Woop2013\]): rays do
+//! not slip through shared edges or corners of one mesh, and the answers are the same bit for bit on all machines, widths
+//! of vectors and numbers of threads, and whether rays are asked about together or alone.
+//!
+//! **A point's own surface**: nothing is left out of a query, so rays that leave a surface start a little above it
+//! ([`offset_origin`]). A triangle is met at t > 0 only, and never along its own plane.
 //!
 //! \[Woop2013\]: S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2 (1), 2013.
 
