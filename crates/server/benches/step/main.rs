@@ -1,4 +1,4 @@
-//! What a step of the server costs, and how many points a second it updates: pose, refit, trace, encode.
+//! What a step of the server costs, and how many points a second it updates: pose, refit, select, trace, encode.
 //! `cargo bench -p dapple-server --bench step -- --help`.
 
 #[path = "../../../trace/benches/rays/clock.rs"]
@@ -17,7 +17,7 @@ use dapple_scene::{NoFiles, Pose, Scene};
 use dapple_stream::{Publisher, PublisherConfig};
 use dapple_trace::Tracer;
 use dapple_trace::psao::generate::{GenerateParams, GeneratedPoints, generate_points};
-use dapple_trace::psao::update::{UpdateParams, Updater};
+use dapple_trace::psao::update::{StepInput, UpdateParams, Updater};
 use serde_json::{Value, json};
 
 use clock::{Took, median, time_process};
@@ -25,7 +25,7 @@ use clock::{Took, median, time_process};
 const STEPS_PER_SECOND: f64 = 30.0;
 /// Processor time of a step, all threads together: half of two cores at 30 steps a second.
 const GOAL_MS: f64 = 1000.0 / STEPS_PER_SECOND;
-const PARTS: [&str; 4] = ["pose", "refit", "trace", "encode"];
+const PARTS: [&str; 5] = ["pose", "refit", "select", "trace", "encode"];
 
 /// What a step of the server costs.
 #[derive(Parser)]
@@ -59,6 +59,7 @@ struct Step {
     took: [Took; PARTS.len()],
     movers: usize,
     traced: u32,
+    rays: u64,
     changed: usize,
     bytes: usize,
 }
@@ -124,17 +125,21 @@ fn measure(name: &str, scene: &Scene, arguments: &Arguments) -> Result<Value> {
         let (now, posing) = time_process(|| scene.pose(step as f64 / STEPS_PER_SECOND));
         pose = now;
         let ((), refitting) = time_process(|| tracer.update(scene, &pose));
-        let (report, tracing) = time_process(|| updater.step(scene, &pose, &tracer));
+        let input = StepInput::default();
+        let ((), selecting) = time_process(|| updater.select(scene, &pose, &mut tracer, &input));
+        let (report, tracing) = time_process(|| updater.trace_selected(scene, &pose, &tracer));
         let (frame, encoding) = time_process(|| publisher.publish(updater.store()));
         steps.push(Step {
-            took: [posing, refitting, tracing, encoding],
+            took: [posing, refitting, selecting, tracing, encoding],
             movers: movers(&before, &pose),
-            traced: report.traced,
+            traced: report.traced(),
+            rays: report.rays(),
             changed: report.changes.len(),
             bytes: frame?.map_or(0, |frame| frame.bytes.len()),
         });
     }
-    Ok(summary(name, scene, count, params.rays, &steps, arguments.threads))
+    let bytes = updater.bytes_per_point();
+    Ok(summary(name, scene, (count, bytes), params.rays, &steps, arguments.threads))
 }
 
 /// About `wanted` points, laid with the default settings but for their density.
@@ -155,7 +160,14 @@ fn movers(before: &Pose, after: &Pose) -> usize {
 }
 
 /// Prints and returns medians over the steps.
-fn summary(name: &str, scene: &Scene, points: usize, rays: u32, steps: &[Step], threads: usize) -> Value {
+fn summary(
+    name: &str,
+    scene: &Scene,
+    (points, bytes_per_point): (usize, f64),
+    rays: u32,
+    steps: &[Step],
+    threads: usize,
+) -> Value {
     let of = |pick: &dyn Fn(&Step) -> f64| median(steps.iter().map(pick));
     let sum = |pick: fn(&Took) -> f64| move |step: &Step| step.took.iter().map(pick).sum::<f64>() * 1e3;
     let (cpu, wall) = (sum(|t| t.cpu_s), sum(|t| t.wall_s));
@@ -184,14 +196,18 @@ fn summary(name: &str, scene: &Scene, points: usize, rays: u32, steps: &[Step], 
     );
     let (traced, changed) = (of(&|s| f64::from(s.traced)), of(&|s| s.changed as f64));
     let bytes = of(&|s| s.bytes as f64);
-    println!("  a step traces {traced} points, changes {changed}, sends {bytes} bytes (medians)");
+    let rays_asked = of(&|s| s.rays as f64);
+    println!(
+        "  a step traces {traced} points by {rays_asked} rays, changes {changed}, sends {bytes} bytes (medians)"
+    );
+    println!("  the server holds {bytes_per_point:.1} bytes a point");
     println!(
         "  points updated a second: {per_second:.0} at {STEPS_PER_SECOND} steps a second, {most_per_second:.0} with all of {threads} threads"
     );
     json!({
         "scene": name, "triangles": scene.triangle_count(), "points": points, "rays_per_point": rays, "movers": movers,
         "parts": parts, "cpu_ms": cpu_ms, "wall_ms": wall_ms, "slowest_cpu_ms": slowest_ms,
-        "traced": traced, "changed": changed, "bytes": bytes,
+        "bytes_per_point": bytes_per_point, "traced": traced, "rays": rays_asked, "changed": changed, "bytes": bytes,
         "updated_per_s": per_second, "most_updated_per_s": most_per_second,
     })
 }

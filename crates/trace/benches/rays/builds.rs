@@ -63,7 +63,7 @@ pub(crate) fn build(
         table.push(Built { name, one_thread, all_threads: None, bytes, most_bytes });
     };
     let (ours, took) = build_ours(mesh, 1, repetitions)?;
-    note(OURS, took, our_bytes(&ours), None);
+    note(OURS, took, Some(ours.bytes()), None);
 
     let mut scenes = Vec::new();
     if let Some(embree) = embree {
@@ -114,7 +114,7 @@ pub(crate) fn build_on_all_threads(
     if let Some(embree) = embree {
         let geometry = Geometry::new(&mesh.positions, &mesh.triangles)?;
         for (quality, name) in QUALITIES {
-            note(name, build_embree(embree, &geometry, quality, flags, 1, repetitions)?.1);
+            note(name, build_embree(embree, &geometry, quality, flags, 0, repetitions)?.1);
         }
     }
     Ok(())
@@ -140,12 +140,6 @@ fn build_embree(
         let (scene, took) = time_process(|| embree::Scene::new(&device, geometry, quality, flags));
         Ok((scene?, took))
     })
-}
-
-// MEMORY OF OUR TRACER: as soon as there is `Tracer::bytes()`, this is `Some(tracer.bytes())`; the table then shows
-// bytes per triangle beside Embree's.
-fn our_bytes(_tracer: &Tracer) -> Option<usize> {
-    None
 }
 
 /// What the last repetition made, and the medians of all.

@@ -142,7 +142,7 @@ impl MeshAlpha {
         alpha
     }
 
-    /// What the triangle of that index carries in [`super::triangle::Triangle::alpha`].
+    /// [`OPAQUE`], [`HOLE`] or an index into the tested triangles.
     pub(crate) fn of_triangle(&self, triangle: usize) -> u32 {
         self.of_triangle.get(triangle).copied().unwrap_or(OPAQUE)
     }

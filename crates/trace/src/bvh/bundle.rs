@@ -6,7 +6,7 @@ use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x8};
 
 use super::placement::Placement;
 use super::tree::CONSERVATIVE;
-use super::triangle::QuickRay;
+use super::triangle::{FARTHEST, LONGEST, QuickRay, SHORTEST};
 
 /// Rays in a bundle: one bit each.
 pub(crate) const BUNDLE: usize = 64;
@@ -114,8 +114,8 @@ impl Bundle {
             let main = d[0].abs().max(d[1].abs()).max(d[2].abs());
             // As in `MeshRay::new`; a NaN among them makes the sum NaN.
             let finite = (d[0] + d[1] + d[2]).simd_eq(d[0] + d[1] + d[2])
-                & main.simd_le(f32::MAX)
-                & (1.0 / main).simd_le(f32::MAX);
+                & main.simd_le(LONGEST)
+                & main.simd_ge(SHORTEST);
             valid |= finite.to_bitmask() << (chunk * LANES);
             main_min = main_min.min(finite.select(main, f32x8::splat(simd, f32::MAX)));
             direction_max = direction_max.max(finite.select(main, zero));
@@ -130,7 +130,7 @@ impl Bundle {
         self.direction_max = direction_max.reduce_max();
         let axis = Vec3::new(sum[0].reduce_sum(), sum[1].reduce_sum(), sum[2].reduce_sum());
         self.axis = (axis / axis.length()).to_array();
-        let sound = self.origin.iter().all(|x| x.is_finite()) && self.t_max > 0.0;
+        let sound = self.origin.iter().all(|x| x.abs() <= FARTHEST) && self.t_max > 0.0;
         if !sound {
             self.valid = 0;
         }
@@ -147,6 +147,7 @@ impl Bundle {
         let [ax, ay, az] = self.axis;
         let (mut lo, mut hi, mut length2) = ([zero; 3], [zero; 3], zero);
         let mut along = f32x8::splat(simd, f32::MAX);
+        let shrink = 1.0 / self.direction_max;
         for chunk in 0..CHUNKS {
             let wanted = self.valid >> (chunk * LANES) & 0xff;
             if wanted == 0 {
@@ -159,13 +160,17 @@ impl Bundle {
                 lo[k] = lo[k].min(d[k]);
                 hi[k] = hi[k].max(d[k]);
             }
-            length2 = length2.max(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+            let e = [d[0] * shrink, d[1] * shrink, d[2] * shrink];
+            length2 = length2.max(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
             let a = d[0] * ax + d[1] * ay + d[2] * az;
             along = along.min(wanted.select(a, f32x8::splat(simd, f32::MAX)));
         }
         // An axis along which no ray runs is reached nowhere, however long the rays (0 times infinity is NaN).
         let scale = |x: f32| if x == 0.0 { 0.0 } else { x * t_far * CONSERVATIVE };
-        let radius2 = length2.reduce_max() * t_far * t_far * (CONSERVATIVE * CONSERVATIVE);
+        // Lengths in units of the largest coordinate, so that their squares exist however short or long they are; the
+        // addend covers what squares of tiny distances lose.
+        let radius = length2.reduce_max().sqrt() * (self.direction_max * t_far) * CONSERVATIVE;
+        let radius2 = radius * radius * CONSERVATIVE + f32::MIN_POSITIVE;
         let along = along.reduce_min() - self.direction_max * (1.0 / (1 << 20) as f32);
         // Not a number where there is no mean direction: then nothing is behind.
         let floor = if along >= 0.0 { 0.0 } else { along * t_far * CONSERVATIVE };

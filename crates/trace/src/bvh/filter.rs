@@ -15,13 +15,19 @@ use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x8};
 use super::leaf::{LANES, Rows};
 use super::triangle::QuickRay;
 
-/// Bound of the error of d · nᵢ over (largest coordinate × longest edge × largest direction): 84 roundings for the
-/// longest coordinate of any edge, which is at most twice that of the two edges that are looked at.
-const EDGE_ERROR: f32 = 1.0 / (1 << 16) as f32;
-/// Bound of the error of t_max (N · d) − N · a over (edge² × (t_max × direction + coordinate)): 80 roundings.
-const REACH_ERROR: f32 = 1.0 / (1 << 17) as f32;
-/// Bound of the error of N · a over (edge² × coordinate): 48 roundings.
-const VOLUME_ERROR: f32 = 1.0 / (1 << 18) as f32;
+/// Bounds are computed from numbers so many times too large, so that they overflow before what they bound does; an
+/// infinite bound decides nothing.
+const HEADROOM: f32 = 16.0;
+/// Bound of the error of d · nᵢ over (largest coordinate L × largest edge coordinate e × largest direction coordinate D), in
+/// units of 2⁻²⁴: a coordinate of edge × corner is at most 2 L e and off by 8 L e (corner, edge, two products, a difference), so the
+/// dot product with d is off by 3 × 8 from that and 3 × 2 × 3 from its own sums: 42; and the exact test moves
+/// corners by 5 L across the ray, each by 2 e: 40. For the third edge e doubles: 164 in all, of 256.
+const EDGE_ERROR: f32 = 1.0 / (1 << 16) as f32 / HEADROOM;
+/// Bound of the error of t_max (N · d) − N · a over e² (t_max D + L), in the same units: N is off by 8 e², so N · d by 42 e² D and
+/// N · a by 48 e² L; the exact test's t by 4 roundings and by its corners' 24 e² L: 76 of 128.
+const REACH_ERROR: f32 = 1.0 / (1 << 17) as f32 / HEADROOM;
+/// Bound of the error of N · a over e² L: 48 of 64.
+const VOLUME_ERROR: f32 = 1.0 / (1 << 18) as f32 / HEADROOM;
 /// The same in `f64`.
 const VOLUME_ERROR_F64: f64 = 1.0 / (1_u64 << 45) as f64;
 /// More than what is lost where products are below the smallest normal number.
@@ -31,8 +37,9 @@ const UNDERFLOW: f32 = 1e-37;
 pub(crate) struct Block<S: Simd> {
     /// The planes through the origin and the edges, turned inwards.
     planes: [[f32x8<S>; 3]; 3],
-    /// The triangles' normals, turned away from the origin, times t_max.
+    /// The triangles' normals, turned away from the origin.
     normal: [f32x8<S>; 3],
+    t_max: f32,
     /// |N · a|.
     volume: f32x8<S>,
     edge_error: f32x8<S>,
@@ -93,24 +100,25 @@ impl<S: Simd> Block<S> {
         let volume = dot(&normal, &a);
 
         let edge = largest(&ab).max(largest(&ca));
-        let coordinate = largest(&a) + edge;
+        let coordinate = (largest(&a) + edge) * HEADROOM;
         let (edge2, both) = (edge * edge, coordinate * edge);
         let lanes = (1_u32 << count) - 1;
         let volume_error = (edge2 * coordinate).mul_add(VOLUME_ERROR, (coordinate + 1.0) * UNDERFLOW);
         let mut edge_error = (both * direction_max).mul_add(EDGE_ERROR, UNDERFLOW * (1.0 + direction_max));
-        let reach = coordinate + t_max * direction_max;
-        let reach_error =
+        let reach = coordinate + t_max * direction_max * HEADROOM;
+        let mut reach_error =
             (edge2 * reach).mul_add(REACH_ERROR, UNDERFLOW * (1.0 + direction_max * (1.0 + t_max)));
         let mut sign = volume;
         let unsure = !volume.abs().simd_gt(volume_error).to_bitmask() as u32 & lanes;
         if unsure != 0 {
-            (sign, edge_error) = resolve(simd, rows, origin, unsure, sign, edge_error);
+            [sign, edge_error, reach_error] =
+                resolve(simd, rows, origin, unsure, [sign, edge_error, reach_error]);
         }
 
         let one = f32x8::splat(simd, 1.0).copysign(sign);
         let planes = [scaled(cross(&b, &bc), one), scaled(cross(&c, &ca), one), scaled(cross(&a, &ab), one)];
-        let normal = scaled(normal, one * t_max);
-        Block { planes, normal, volume: volume * one, edge_error, reach_error, lanes }
+        let normal = scaled(normal, one);
+        Block { planes, normal, t_max, volume: volume * one, edge_error, reach_error, lanes }
     }
 
     /// Which lanes may be met by the ray along `d`, and which of those are met for sure.
@@ -119,7 +127,7 @@ impl<S: Simd> Block<S> {
         let d = splat3(simd, &d);
         let [p, q, r] = &self.planes;
         let inside = dot(p, &d).min(dot(q, &d)).min(dot(r, &d));
-        let reach = dot(&self.normal, &d) - self.volume;
+        let reach = dot(&self.normal, &d).mul_sub(self.t_max, self.volume);
         // Not beyond an error on the wrong side; so too where a number is none.
         let out = inside.simd_lt(-self.edge_error) | reach.simd_lt(-self.reach_error);
         let maybe = !(out.to_bitmask() as u32) & self.lanes;
@@ -150,7 +158,7 @@ impl<S: Simd> Block<S> {
         self.volume.store_slice(&mut rows[12]);
         self.edge_error.store_slice(&mut rows[13]);
         self.reach_error.store_slice(&mut rows[14]);
-        Spread { rows }
+        Spread { rows, t_max: self.t_max }
     }
 }
 
@@ -176,12 +184,11 @@ pub(crate) fn test_one<S: Simd>(simd: S, rows: &Rows<S>, lanes: u32, ray: &Quick
     let (along, u, v, t) = (along * one, u * one, v * one, t * one);
 
     let edge = largest(&ab).max(largest(&ac));
-    let coordinate = largest(&at) + edge;
-    let edge_error =
-        (coordinate * edge).mul_add(EDGE_ERROR * ray.direction_max, UNDERFLOW * (1.0 + ray.direction_max));
-    let reach = coordinate + ray.t_far * ray.direction_max;
-    let reach_error =
-        (edge * edge * reach).mul_add(REACH_ERROR, UNDERFLOW * (1.0 + ray.direction_max * (1.0 + ray.t_far)));
+    let coordinate = (largest(&at) + edge) * HEADROOM;
+    let underflow = (coordinate + 1.0) * (UNDERFLOW * (1.0 + ray.direction_max * (1.0 + ray.t_far)));
+    let edge_error = (coordinate * edge * ray.direction_max).mul_add(EDGE_ERROR, underflow);
+    let reach = coordinate + ray.t_far * ray.direction_max * HEADROOM;
+    let reach_error = (edge * edge * reach).mul_add(REACH_ERROR, underflow);
     let inside = u.min(v).min(along - u - v);
     let reach = (along * ray.t_far - t).min(t);
     // Seen edge-on the sign says nothing; but u + v + w is almost 0 then, so that either sign leaves one far below 0.
@@ -198,11 +205,13 @@ pub(crate) fn test_one<S: Simd>(simd: S, rows: &Rows<S>, lanes: u32, ray: &Quick
 /// A block in memory, to take single lanes from.
 pub(crate) struct Spread {
     rows: [[f32; LANES]; 15],
+    t_max: f32,
 }
 
 /// One triangle of a block, against eight rays at a time.
 pub(crate) struct Lane<S: Simd> {
     rows: [f32x8<S>; 15],
+    t_max: f32,
 }
 
 impl Spread {
@@ -212,7 +221,7 @@ impl Spread {
         for (row, numbers) in rows.iter_mut().zip(&self.rows) {
             *row = f32x8::splat(simd, numbers[lane]);
         }
-        Lane { rows }
+        Lane { rows, t_max: self.t_max }
     }
 }
 
@@ -222,7 +231,7 @@ impl<S: Simd> Lane<S> {
     pub(crate) fn test(&self, d: &[f32x8<S>; 3]) -> (u32, u32) {
         let [p0, p1, p2, q0, q1, q2, r0, r1, r2, n0, n1, n2, volume, edge_error, reach_error] = self.rows;
         let inside = dot(&[p0, p1, p2], d).min(dot(&[q0, q1, q2], d)).min(dot(&[r0, r1, r2], d));
-        let reach = dot(&[n0, n1, n2], d) - volume;
+        let reach = dot(&[n0, n1, n2], d).mul_sub(self.t_max, volume);
         let out = inside.simd_lt(-edge_error) | reach.simd_lt(-reach_error);
         let maybe = !(out.to_bitmask() as u32) & 0xff;
         if maybe == 0 {
@@ -242,11 +251,11 @@ fn resolve<S: Simd>(
     rows: &Rows<S>,
     origin: &[f32; 3],
     mut unsure: u32,
-    sign: f32x8<S>,
-    edge_error: f32x8<S>,
-) -> (f32x8<S>, f32x8<S>) {
+    [sign, edge_error, reach_error]: [f32x8<S>; 3],
+) -> [f32x8<S>; 3] {
     let rows = rows.map(<[f32; LANES]>::from);
     let (mut sign, mut edge_error) = (<[f32; LANES]>::from(sign), <[f32; LANES]>::from(edge_error));
+    let mut reach_error = <[f32; LANES]>::from(reach_error);
     while unsure != 0 {
         let lane = unsure.trailing_zeros() as usize;
         unsure &= unsure - 1;
@@ -265,8 +274,8 @@ fn resolve<S: Simd>(
                 sign[lane] = 0.0_f32.copysign(if volume < 0.0 { -1.0 } else { 1.0 });
             }
         } else {
-            edge_error[lane] = f32::INFINITY;
+            (edge_error[lane], reach_error[lane]) = (f32::INFINITY, f32::INFINITY);
         }
     }
-    (f32x8::load_array(simd, sign), f32x8::load_array(simd, edge_error))
+    [sign, edge_error, reach_error].map(|x| f32x8::load_array(simd, x))
 }

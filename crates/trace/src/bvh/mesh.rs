@@ -11,7 +11,7 @@ use super::alpha::{AlphaMaterials, HOLE, MeshAlpha};
 use super::build::{MESH_LEAVES, build};
 use super::leaf::Triangles;
 use super::tree::Tree;
-use super::triangle::{MeshRay, Triangle, TriangleHit, intersect};
+use super::triangle::{FARTHEST, MeshRay, Triangle, TriangleHit, intersect};
 
 /// Rebuild instead of refit once the expected cost of a ray has grown by this factor.
 const REBUILD_COST_FACTOR: f64 = 1.5;
@@ -37,7 +37,11 @@ pub(crate) struct MeshBvh {
 
 fn corners(positions: &[Vec3], indices: [u32; 3]) -> [[f32; 3]; 3] {
     let corners = indices.map(|i| positions.get(i as usize).copied().unwrap_or(Vec3::NAN));
-    if corners.iter().all(|c| c.is_finite()) { corners.map(|c| c.to_array()) } else { [[f32::NAN; 3]; 3] }
+    if corners.iter().all(|c| c.abs().cmple(Vec3::splat(FARTHEST)).all()) {
+        corners.map(|c| c.to_array())
+    } else {
+        [[f32::NAN; 3]; 3]
+    }
 }
 
 /// Without margin.

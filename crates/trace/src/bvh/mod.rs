@@ -59,9 +59,11 @@ pub fn count_blocked(blocked: &BlockedMask) -> u32 {
 /// A ray that meets what lies at `0 < t ≤ t_max` lengths of its direction from its origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where it starts. See [`offset_origin`] for rays that leave a surface.
+    /// Where it starts, each coordinate within ±10¹⁸ (in the mesh's space too). See [`offset_origin`] for rays that leave
+    /// a surface.
     pub origin_world: Vec3,
-    /// Where it goes; of unit length if distances are to be metres.
+    /// Where it goes; of unit length if distances are to be metres. Its largest coordinate must lie in 10⁻¹⁸ … 10¹⁸, also
+    /// in the space of the mesh that it meets; otherwise it hits nothing.
     pub direction_world: Vec3,
     /// How far it goes, in lengths of `direction_world`; infinity is allowed. At 0 or below (or NaN) it hits nothing.
     pub t_max: f32,

@@ -8,8 +8,11 @@ use super::mesh::MeshBvh;
 use super::tree::WIDTH;
 use super::triangle::MeshRay;
 
-/// World boxes grow by this part of the numbers they were computed from: more than the rounding of the transform.
+/// World boxes grow by this part of the numbers they were computed from, times the transform's condition: more than the
+/// rounding of the transform and of the way back.
 const BOX_MARGIN: f32 = 1.0 / (1 << 20) as f32;
+/// Transforms that stretch one direction more than so many times as much as another cannot be inverted in `f32`.
+const WORST_CONDITION: f32 = 1e6;
 
 /// World to mesh: the difference to the translation is taken first, in the world, so that an instance far from the
 /// origin loses no more digits than its positions already have.
@@ -19,6 +22,8 @@ pub(crate) struct Placement {
     translation_world: Vec3,
     /// The mesh's space is the world.
     pub(crate) identity: bool,
+    /// Largest number of the map times that of its inverse; 1 for a turn and a scale along the axes.
+    condition: f32,
 }
 
 impl Placement {
@@ -29,8 +34,13 @@ impl Placement {
             return None;
         }
         let mesh_from_world = inverse(&world_from_mesh)?;
+        let largest = |m: &Mat3| m.to_cols_array().into_iter().fold(0.0_f32, |l, x| l.max(x.abs()));
+        let condition = largest(&world_from_mesh) * largest(&mesh_from_world);
+        if condition.is_nan() || condition > WORST_CONDITION {
+            return None;
+        }
         let identity = world_from_mesh == Mat3::IDENTITY && translation_world == Vec3::ZERO;
-        Some(Placement { mesh_from_world, translation_world, identity })
+        Some(Placement { mesh_from_world, translation_world, identity, condition })
     }
 
     #[inline]
@@ -67,7 +77,7 @@ fn inverse(m: &Mat3) -> Option<Mat3> {
 }
 
 /// Around the transformed boxes of the root's children, clamped to finite numbers. Empty if there is nothing.
-pub(crate) fn bounds_world(bvh: &MeshBvh, posed: &PosedInstance) -> Aabb {
+pub(crate) fn bounds_world(bvh: &MeshBvh, posed: &PosedInstance, placement: &Placement) -> Aabb {
     let Some(root) = bvh.tree.nodes.first() else { return Aabb::EMPTY };
     let map = &posed.world_from_mesh;
     let linear = Mat3::from(map.matrix3);
@@ -80,7 +90,7 @@ pub(crate) fn bounds_world(bvh: &MeshBvh, posed: &PosedInstance) -> Aabb {
         }
         let size = absolute * b.min.abs().max(b.max.abs()) + Vec3::from(map.translation).abs();
         let b = b.transformed(map);
-        let margin = size * BOX_MARGIN;
+        let margin = size * (BOX_MARGIN * placement.condition.max(1.0));
         bounds = bounds.union(Aabb { min: b.min - margin, max: b.max + margin });
     }
     if bounds.is_empty() || bounds.min.is_nan() || bounds.max.is_nan() {

@@ -10,7 +10,7 @@ use super::bundle::{BUNDLE, Bundle, Reach};
 use super::stack::Stack;
 use super::tracer::{Blockers, PlacedBvh, Top, Tracer};
 use super::traverse::{Blocker, Boxes, Visitor, trace_bundle, traverse};
-use super::tree::{CONSERVATIVE, Child, WIDTH};
+use super::tree::{CONSERVATIVE, Child, TINY, WIDTH};
 use super::triangle::{MeshRay, TriangleHit};
 use super::{BlockedMask, Hit, MAX_DIRECTIONS, Ray};
 
@@ -118,7 +118,7 @@ impl Tracer {
             let nodes = top.tree.nodes.len() as u32;
             let mut stack: Stack<(f32, u32), 24> = Stack::new((0.0, 0));
             while let Some((enter, index)) = stack.pop() {
-                if enter > t_max * CONSERVATIVE {
+                if enter > t_max * CONSERVATIVE + TINY {
                     continue;
                 }
                 if index >= nodes {

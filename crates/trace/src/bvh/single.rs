@@ -9,7 +9,7 @@ use super::filter::test_one;
 use super::mesh::MeshBvh;
 use super::stack::Stack;
 use super::traverse::Boxes;
-use super::tree::{CONSERVATIVE, Child, WIDTH};
+use super::tree::{CONSERVATIVE, Child, TINY, WIDTH};
 use super::triangle::{MeshRay, QuickRay, TriangleHit};
 
 /// What becomes of the triangles that a ray may meet. A trait and not a closure, as [`super::traverse::Visitor`].
@@ -161,7 +161,7 @@ impl MeshBvh {
         let mut ray = *ray;
         let mut stack: Stack<(f32, u32), 40> = Stack::new((0.0, root));
         while let Some((enter, index)) = stack.pop() {
-            if enter > ray.t_far * CONSERVATIVE {
+            if enter > ray.t_far * CONSERVATIVE + TINY {
                 continue;
             }
             let node = &self.tree.nodes[index as usize];

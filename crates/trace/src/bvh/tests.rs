@@ -394,6 +394,47 @@ fn all_widths_give_the_same_answers() {
 }
 
 #[test]
+fn bundles_and_single_rays_agree_at_any_scale() {
+    let mut random = Random(23);
+    // Sizes of the mesh and of the instance: products overflow or vanish in some, in others only some of the way.
+    for (size, scale) in
+        [(1.0, 1e17), (1.0, 1e-17), (1e10, 1e8), (1e12, 100.0), (1e17, 1e-5), (1e-15, 1e-10), (1e-17, 1e17)]
+    {
+        let mut m = soup(&mut random, 80, 0.6);
+        for p in &mut m.positions {
+            *p *= size;
+        }
+        let map = Affine3A::from_scale(Vec3::splat(scale));
+        let (scene, pose) = scene(vec![m], &[(0, map)]);
+        let mut tracer = Tracer::new(&scene, &pose);
+        let mut blocked = 0;
+        for i in 0..30 {
+            let mut origin = random.vector() * (size * scale);
+            if i % 3 == 0 {
+                // In the plane of a triangle.
+                let [a, b, c] = scene.meshes[0].triangles[i].map(|k| scene.meshes[0].positions[k as usize]);
+                origin = map.transform_point3(2.0 * b - 0.7 * a - 0.3 * c);
+            }
+            let directions: Vec<Vec3> = (0..64).map(|_| random.direction()).collect();
+            for t_max in [f32::INFINITY, size * scale] {
+                for vectors in Vectors::all() {
+                    tracer.set_vectors(vectors);
+                    let mask = tracer.occlusion(origin, &directions, t_max)[0];
+                    for (i, &direction_world) in directions.iter().enumerate() {
+                        let ray = Ray { origin_world: origin, direction_world, t_max };
+                        let bit = mask >> i & 1 == 1;
+                        assert_eq!(bit, tracer.occluded(&ray), "{size} {scale} {ray:?}");
+                        assert_eq!(bit, tracer.closest_hit(&ray).is_some(), "{size} {scale} {ray:?}");
+                    }
+                    blocked += mask.count_ones();
+                }
+            }
+        }
+        assert!(blocked > 100, "{size} {scale}: {blocked}");
+    }
+}
+
+#[test]
 fn all_hits_come_in_order() {
     let walls = (0..5).map(|i| {
         let z = 1.0 + i as f32;

@@ -17,14 +17,14 @@ use super::tree::Tree;
 /// Answers ray queries on a scene in one pose.
 ///
 /// Instances that do not cast ([`dapple_scene::Instance::casts`]), and those whose transform cannot be inverted in
-/// `f32` (scale 0), are not hit. Where a material has alpha (`Mask`, or `Blend` with cutoff 0.5), texels below the
+/// `f32` (scale 0, or a million times smaller than another), are not hit. Where a material has alpha (`Mask`, or `Blend` with cutoff 0.5), texels below the
 /// cutoff let rays through.
 #[derive(Clone)]
 pub struct Tracer {
-    /// The widest vectors of this machine.
+    /// The widest vectors of this machine, until others are chosen.
     pub(super) level: Level,
     back_faces: BackFaces,
-    pub(super) alpha: AlphaMaterials,
+    pub(super) alpha: Arc<AlphaMaterials>,
     mesh_alpha: Vec<Arc<MeshAlpha>>,
     /// Trees of meshes with rigid instances, parallel to the scene's meshes.
     rigid: Vec<Option<Arc<MeshBvh>>>,
@@ -95,7 +95,7 @@ impl Tracer {
 
     /// As [`Tracer::new`], saying what rays do at backs.
     pub fn with_back_faces(scene: &Scene, pose: &Pose, back_faces: BackFaces) -> Tracer {
-        let alpha = AlphaMaterials::new(scene);
+        let alpha = Arc::new(AlphaMaterials::new(scene));
         let mesh_alpha =
             scene.meshes.iter().map(|m| Arc::new(MeshAlpha::new(scene, m, &alpha, back_faces))).collect();
         let mut tracer = Tracer {
@@ -119,7 +119,9 @@ impl Tracer {
     /// has grown by half since they were built. Results are the same as those of a new tracer.
     pub fn update(&mut self, scene: &Scene, pose: &Pose) {
         if self.rigid.len() != scene.meshes.len() || self.instances.len() != scene.instances.len() {
+            let level = self.level;
             *self = Tracer::with_back_faces(scene, pose, self.back_faces);
+            self.level = level;
         } else {
             self.place(scene, pose);
         }
@@ -160,7 +162,7 @@ impl Tracer {
                 }
             };
             let (Some(bvh), Some(placement)) = (bvh, Placement::new(posed)) else { return };
-            let bounds_world = bounds_world(&bvh, posed);
+            let bounds_world = bounds_world(&bvh, posed, &placement);
             let deformed = posed.deformed.is_some();
             *placed = Some(PlacedBvh { bvh, deformed, placement, bounds_world });
         });
@@ -195,7 +197,7 @@ impl Tracer {
             let posed =
                 PosedInstance { world_from_mesh: Affine3A::from_mat3(placed.rest_from_mesh), deformed: None };
             tracer.instances[instance] = Placement::new(&posed).map(|placement| {
-                let bounds_world = bounds_world(&bvh, &posed);
+                let bounds_world = bounds_world(&bvh, &posed, &placement);
                 PlacedBvh { bvh, deformed: false, placement, bounds_world }
             });
         }
@@ -219,7 +221,7 @@ impl Tracer {
     }
 
     /// Says which instances count as movers (parallel to the scene's instances; what is missing is still). None do
-    /// after [`Tracer::new`]. It survives [`Tracer::update`], and changes no answer but those of
+    /// after [`Tracer::new`]. It survives [`Tracer::update`] (to the same scene), and changes no answer but those of
     /// [`Tracer::occlusion_by`].
     pub fn set_movers(&mut self, movers: &[bool]) {
         let given = movers.iter().copied().chain(std::iter::repeat(false));

@@ -9,7 +9,7 @@ use super::bundle::{BUNDLE, Bundle, CHUNKS, LANES, Reach};
 use super::filter::Block;
 use super::mesh::MeshBvh;
 use super::stack::Stack;
-use super::tree::{CONSERVATIVE, Child, Node, Tree, WIDTH};
+use super::tree::{CONSERVATIVE, Child, Node, TINY, Tree, WIDTH};
 use super::triangle::QuickRay;
 
 /// A ray against the eight children of a node costs about as much as eight rays against one child.
@@ -67,7 +67,7 @@ impl<S: Simd> Boxes<S> {
         let (ax, bx, ay, by, az, bz) = (x0 * ix, x1 * ix, y0 * iy, y1 * iy, z0 * iz, z1 * iz);
         let enter = ax.min(bx).max(ay.min(by)).max(az.min(bz).max(0.0));
         let leave = ax.max(bx).min(ay.max(by)).min(az.max(bz).min(t_max));
-        (enter.simd_le(leave * CONSERVATIVE).to_bitmask() as u32, enter)
+        (enter.simd_le(leave.mul_add(CONSERVATIVE, TINY)).to_bitmask() as u32, enter)
     }
 
     #[inline(always)]
@@ -101,7 +101,7 @@ fn rays_through<S: Simd>(
         let (ax, bx, ay, by, az, bz) = (ix * x0, ix * x1, iy * y0, iy * y1, iz * z0, iz * z1);
         let enter = ax.min(bx).max(ay.min(by)).max(az.min(bz).max(0.0));
         let leave = ax.max(bx).min(ay.max(by)).min(az.max(bz).min(t_max));
-        through |= enter.simd_le(leave * CONSERVATIVE).to_bitmask() << (chunk * LANES);
+        through |= enter.simd_le(leave.mul_add(CONSERVATIVE, TINY)).to_bitmask() << (chunk * LANES);
     }
     through & rays
 }

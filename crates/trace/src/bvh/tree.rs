@@ -12,6 +12,13 @@ pub(crate) const MAX_LEAF: usize = 8;
 /// triangle test (\[Ize2013\] derives 1 + 2 gamma(3) for the former).
 pub(crate) const CONSERVATIVE: f32 = 1.0 + 1.0 / (1 << 20) as f32;
 
+/// Added to the end of a ray in a box: more than products below the smallest normal number are off by.
+pub(crate) const TINY: f32 = 1e-37;
+
+/// All coordinates of an empty box: a corner of the world that neither rays nor their reach touch, whichever way boxes are
+/// tested (inverted boxes would let single rays in).
+const NOWHERE: f32 = f32::MAX;
+
 const INNER: u8 = 0;
 const EMPTY: u8 = 0xff;
 
@@ -19,7 +26,7 @@ const EMPTY: u8 = 0xff;
 #[derive(Clone)]
 #[repr(C, align(64))]
 pub(crate) struct Node {
-    /// Smallest x, y, z, then largest x, y, z of each child; inverted infinities for children that hold nothing.
+    /// Smallest x, y, z, then largest x, y, z of each child; [`NOWHERE`] for children that hold nothing.
     pub(crate) bounds: [[f32; WIDTH]; 6],
     /// Index of the child node, or of the leaf's first primitive.
     child: [u32; WIDTH],
@@ -39,8 +46,7 @@ pub(crate) enum Child {
 
 impl Node {
     pub(crate) fn empty() -> Node {
-        let (lo, hi) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
-        Node { bounds: [lo, lo, lo, hi, hi, hi], child: [0; WIDTH], count: [EMPTY; WIDTH] }
+        Node { bounds: [[NOWHERE; WIDTH]; 6], child: [0; WIDTH], count: [EMPTY; WIDTH] }
     }
 
     #[inline(always)]
@@ -65,14 +71,18 @@ impl Node {
     }
 
     pub(crate) fn set_bounds(&mut self, slot: usize, b: &Aabb) {
+        let nowhere = b.is_empty();
         for axis in 0..3 {
-            self.bounds[axis][slot] = b.min[axis];
-            self.bounds[axis + 3][slot] = b.max[axis];
+            self.bounds[axis][slot] = if nowhere { NOWHERE } else { b.min[axis] };
+            self.bounds[axis + 3][slot] = if nowhere { NOWHERE } else { b.max[axis] };
         }
     }
 
     pub(crate) fn child_bounds(&self, slot: usize) -> Aabb {
         let b = &self.bounds;
+        if b[0][slot] == NOWHERE {
+            return Aabb::EMPTY;
+        }
         Aabb {
             min: Vec3::new(b[0][slot], b[1][slot], b[2][slot]),
             max: Vec3::new(b[3][slot], b[4][slot], b[5][slot]),

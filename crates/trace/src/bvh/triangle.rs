@@ -28,6 +28,12 @@ pub(crate) struct MeshRay {
     pub(crate) t_max: f32,
 }
 
+/// Largest coordinate of a corner or of a ray's origin: products of two exist. Triangles and rays beyond are not there.
+pub(crate) const FARTHEST: f32 = 1e18;
+/// Rays whose direction's largest coordinate, in a mesh's space, lies outside of this range hit nothing there.
+pub(crate) const SHORTEST: f32 = 1e-18;
+pub(crate) const LONGEST: f32 = 1e18;
+
 /// What box tests and quick triangle tests need of a valid ray.
 #[derive(Clone, Copy)]
 pub(crate) struct QuickRay {
@@ -61,12 +67,20 @@ pub(crate) struct TriangleHit {
 }
 
 impl MeshRay {
-    /// `None` for rays that cannot hit anything: numbers not finite, no direction, no length.
+    /// `None` for rays that cannot hit anything: numbers not finite, no direction (see [`SHORTEST`], [`LONGEST`]), no
+    /// length.
     pub(crate) fn new(origin: Vec3, direction: Vec3, t_max: f32) -> Option<MeshRay> {
         let d = direction.to_array();
         let along = main_axis(d);
         let scale = 1.0 / d[along];
-        if !(origin.is_finite() && direction.is_finite() && scale.is_finite() && t_max > 0.0) {
+        let length = d[along].abs();
+        let sound = length >= SHORTEST && length <= LONGEST;
+        if !(origin.abs().max_element() <= FARTHEST
+            && origin.is_finite()
+            && direction.is_finite()
+            && sound
+            && t_max > 0.0)
+        {
             return None;
         }
         let axes = axes_around(along);

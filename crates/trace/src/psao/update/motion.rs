@@ -92,11 +92,13 @@ pub(super) struct Observed {
     pub(super) swept: Vec<Near>,
     /// Where casters stood when they became movers, or still.
     pub(super) switched: Vec<Near>,
+    /// An instance became a mover, or still, whether it casts or not.
+    pub(super) any_switched: bool,
 }
 
 impl Observed {
     pub(super) fn anything(&self) -> bool {
-        !self.switched.is_empty() || self.moved.contains(&true)
+        self.any_switched || self.moved.contains(&true)
     }
 }
 
@@ -159,6 +161,7 @@ impl Motion {
                 self.movers[i] = false;
                 switches = true;
             }
+            observed.any_switched |= switches;
             if switches && casts {
                 observed.switched.push(before);
             }
@@ -181,7 +184,9 @@ impl Motion {
 
 /// Whether an instance is placed or bent differently.
 fn differs(a: &PosedInstance, b: &PosedInstance) -> bool {
-    a.world_from_mesh != b.world_from_mesh
+    // Numbers that are none differ from themselves; such an instance is nowhere, and rests there.
+    let finite = a.world_from_mesh.is_finite() || b.world_from_mesh.is_finite();
+    (finite && a.world_from_mesh != b.world_from_mesh)
         || match (&a.deformed, &b.deformed) {
             (None, None) => false,
             (Some(a), Some(b)) => !Arc::ptr_eq(a, b) && a.positions != b.positions,

@@ -41,7 +41,9 @@ impl Updater {
             Some(budget) => self.spend(budget, input),
         };
         let refinable = self.params.refines() && self.choose_refined(scene, pose, input, left);
-        self.restless = refinable || self.counts.backlog > 0;
+        // What is traced now may be refined from the next step on.
+        let traced = self.params.refines() && self.clusters.iter().any(|c| c.selected != 0);
+        self.restless = refinable || traced || self.counts.backlog > 0;
     }
 
     /// One step further in time.
@@ -140,13 +142,17 @@ impl Updater {
             .collect();
         ranked.par_sort_unstable();
         let any = !ranked.is_empty();
+        let mut idle = left > 0 && input.ray_budget.is_some_and(|budget| left == budget);
         'spending: for (_, rays, index) in ranked {
             let cluster = &mut self.clusters[index];
             let next = (2 * rays.max(params.rays)).min(params.rays_still);
             let cost = u64::from(next - rays);
-            if cost > left {
+            // One point at least in a step that has nothing else to do, however small the budget.
+            let first = std::mem::take(&mut idle);
+            if cost > left && !first {
                 break;
             }
+            left = left.max(cost);
             cluster.remember(scene, pose, &self.anchors);
             for bit in bits(cluster.unsettled()) {
                 if cluster.rays_so_far(bit, params) != rays {
