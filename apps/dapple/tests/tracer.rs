@@ -87,7 +87,7 @@ fn compare(name: &str, mut scene: Scene) -> (usize, usize) {
     let rays = 16;
     let mut sites = 0;
     // Some scenes have many triangles without area.
-    for site in (0..1000_u64) {
+    for site in 0..1000_u64 {
         let random = |k: u32| unit_interval(hash(7, site, k));
         let [a, b, c] = triangles[(random(0) * triangles.len() as f32) as usize];
         let (u, v) = (f64::from(random(1)), f64::from(random(2)));

@@ -132,8 +132,8 @@ fn measure(name: &str, scene: &Scene, arguments: &Arguments) -> Result<Value> {
         steps.push(Step {
             took: [posing, refitting, selecting, tracing, encoding],
             movers: movers(&before, &pose),
-            traced: report.traced(),
-            rays: report.rays(),
+            traced: report.counts.traced(),
+            rays: report.counts.rays(),
             changed: report.changes.len(),
             bytes: frame?.map_or(0, |frame| frame.bytes.len()),
         });

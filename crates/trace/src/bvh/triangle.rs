@@ -74,7 +74,7 @@ impl MeshRay {
         let along = main_axis(d);
         let scale = 1.0 / d[along];
         let length = d[along].abs();
-        let sound = length >= SHORTEST && length <= LONGEST;
+        let sound = (SHORTEST..=LONGEST).contains(&length);
         if !(origin.abs().max_element() <= FARTHEST
             && origin.is_finite()
             && direction.is_finite()
