@@ -2,7 +2,11 @@
 
 use std::ops::Range;
 
+use dapple_scene::Aabb;
+use dapple_scene::glam::Vec3;
 use fearless_simd::{Simd, SimdBase, f32x8};
+
+use super::triangle::FARTHEST;
 
 /// Lanes of a block of triangles.
 pub(crate) const LANES: usize = 8;
@@ -24,6 +28,17 @@ pub(crate) struct Triangles {
     ids: Vec<u32>,
 }
 
+/// A triangle's corners; NaN if one has no position within [`FARTHEST`].
+#[inline]
+pub(crate) fn corners(positions: &[Vec3], indices: [u32; 3]) -> [[f32; 3]; 3] {
+    const NOWHERE: [[f32; 3]; 3] = [[f32::NAN; 3]; 3];
+    let [a, b, c] = indices.map(|i| positions.get(i as usize));
+    let (Some(a), Some(b), Some(c)) = (a, b, c) else { return NOWHERE };
+    let corners = [a.to_array(), b.to_array(), c.to_array()];
+    let near = corners.as_flattened().iter().fold(true, |near, x| near & (x.abs() <= FARTHEST));
+    if near { corners } else { NOWHERE }
+}
+
 impl Triangles {
     /// Room for as many triangles as there are `ids`; the corners are still to be set.
     pub(crate) fn new(ids: Vec<u32>) -> Triangles {
@@ -39,17 +54,30 @@ impl Triangles {
         self.rows.capacity() * size_of::<f32>() + self.ids.capacity() * size_of::<u32>()
     }
 
-    /// Sets all corners of the leaf `range`.
-    pub(crate) fn set_leaf(&mut self, range: Range<usize>, mut corners_of: impl FnMut(u32) -> [[f32; 3]; 3]) {
+    /// Sets all corners of the leaf `range` from the mesh's `triangles`; returns the box around them.
+    ///
+    /// Runs for every leaf of every deformed mesh each frame, hence without branches for each number.
+    pub(crate) fn set_leaf(
+        &mut self,
+        range: Range<usize>,
+        positions: &[Vec3],
+        triangles: &[[u32; 3]],
+    ) -> Aabb {
         let n = range.len();
         let block = &mut self.rows[range.start * ROWS..range.end * ROWS];
+        let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         for (lane, &id) in self.ids[range].iter().enumerate() {
-            for (corner, position) in corners_of(id).iter().enumerate() {
+            let corners = corners(positions, triangles[id as usize]);
+            for (corner, position) in corners.iter().enumerate() {
                 for (axis, &x) in position.iter().enumerate() {
                     block[(3 * corner + axis) * n + lane] = x;
+                    // Of no effect where x is none.
+                    min[axis] = if x < min[axis] { x } else { min[axis] };
+                    max[axis] = if x > max[axis] { x } else { max[axis] };
                 }
             }
         }
+        Aabb { min: min.into(), max: max.into() }
     }
 
     /// Corners of the triangle in a lane of the leaf `range`.

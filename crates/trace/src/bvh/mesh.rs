@@ -9,9 +9,9 @@ use rayon::prelude::*;
 
 use super::alpha::{AlphaMaterials, HOLE, MeshAlpha};
 use super::build::{MESH_LEAVES, build};
-use super::leaf::Triangles;
+use super::leaf::{Triangles, corners};
 use super::tree::Tree;
-use super::triangle::{FARTHEST, MeshRay, Triangle, TriangleHit, intersect};
+use super::triangle::{MeshRay, Triangle, TriangleHit, intersect};
 
 /// Rebuild instead of refit once the expected cost of a ray has grown by this factor.
 const REBUILD_COST_FACTOR: f64 = 1.5;
@@ -33,15 +33,6 @@ pub(crate) struct MeshBvh {
     alpha: Arc<MeshAlpha>,
     /// Cost when it was built.
     built_cost: f64,
-}
-
-fn corners(positions: &[Vec3], indices: [u32; 3]) -> [[f32; 3]; 3] {
-    let corners = indices.map(|i| positions.get(i as usize).copied().unwrap_or(Vec3::NAN));
-    if corners.iter().all(|c| c.abs().cmple(Vec3::splat(FARTHEST)).all()) {
-        corners.map(|c| c.to_array())
-    } else {
-        [[f32::NAN; 3]; 3]
-    }
 }
 
 /// Without margin.
@@ -102,15 +93,7 @@ impl MeshBvh {
     /// Sets all corners and all boxes.
     fn fit(&mut self, mesh: &Mesh, positions: &[Vec3]) {
         let triangles = &mut self.triangles;
-        self.tree.refit(|range| {
-            let mut bounds = Aabb::EMPTY;
-            triangles.set_leaf(range, |id| {
-                let corners = corners(positions, mesh.triangles[id as usize]);
-                bounds = bounds.union(bounds_of(&corners));
-                corners
-            });
-            with_margin(bounds)
-        });
+        self.tree.refit(|range| with_margin(triangles.set_leaf(range, positions, &mesh.triangles)));
         self.bounds = self.tree.bounds();
     }
 

@@ -128,6 +128,48 @@ fn where_a_mover_comes_to_rest_points_settle_again() {
 }
 
 #[test]
+fn points_on_what_casts_nothing_settle_again_too() {
+    let (mut scene, mut pose) = stage();
+    scene.instances[2].casts = false;
+    let (mut tracer, mut updater) = start(&scene, &pose, refined(0));
+    put(&scene, &mut pose, &mut tracer, Vec3::new(1.0, 0.26, 1.0));
+    for _ in 0..100 {
+        updater.step(&scene, &pose, &mut tracer, &FREE);
+    }
+    assert_eq!(updater.clone().step_all(&scene, &pose, &tracer).changes, []);
+    assert_eq!(updater.step(&scene, &pose, &mut tracer, &FREE), UpdateReport::default());
+}
+
+#[test]
+fn a_budget_below_one_refinement_still_refines() {
+    let (scene, pose) = stage();
+    let (mut tracer, mut updater) = start(&scene, &pose, refined(0));
+    let input = StepInput { ray_budget: Some(1), ..FREE };
+    for step in 0..50 {
+        let report = updater.step(&scene, &pose, &mut tracer, &input);
+        assert_eq!(report.counts.refined, 1, "step {step}");
+    }
+}
+
+#[test]
+fn refinement_goes_on_after_a_backlog_longer_than_rest() {
+    let (scene, mut pose) = stage();
+    let (mut tracer, mut updater) = start(&scene, &pose, refined(0));
+    put(&scene, &mut pose, &mut tracer, Vec3::new(1.0, 0.26, 1.0));
+    let mut most = 0;
+    for _ in 0..400 {
+        let input = StepInput { ray_budget: Some(64), ..FREE };
+        let report = updater.step(&scene, &pose, &mut tracer, &input);
+        most = most.max(report.counts.oldest_steps);
+    }
+    assert!(most > 60, "the backlog lasted {most} steps only");
+    for _ in 0..100 {
+        updater.step(&scene, &pose, &mut tracer, &FREE);
+    }
+    assert_eq!(updater.clone().step_all(&scene, &pose, &tracer).changes, []);
+}
+
+#[test]
 fn the_estimate_is_exact_where_it_can_be() {
     for open in 0..=64 {
         for left in 0..=open {
