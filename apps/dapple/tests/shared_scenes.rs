@@ -3,28 +3,14 @@
 
 mod common;
 
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use common::{config, join, server, shared, small};
+use common::{config, join, server, shared_scene, small};
 use dapple_client::Reconstruction;
-use dapple_scene::Files;
-
-/// The files beside a scene.
-struct Folder(PathBuf);
-
-impl Files for Folder {
-    fn read(&self, uri: &str, _limit_bytes: u64) -> std::io::Result<Vec<u8>> {
-        std::fs::read(self.0.join(uri))
-    }
-}
 
 /// Loads, lights, streams and draws one scene, with an occlusion distance that fits its size.
-fn light(path: &str, moves: bool) {
-    let Some(path) = shared(path) else { return };
-    let folder = Folder(path.parent().unwrap_or(Path::new("")).to_owned());
-    let name = path.file_name().unwrap().to_string_lossy();
-    let scene = Arc::new(dapple_scene::load(&name, &std::fs::read(&path).unwrap(), &folder).unwrap());
+fn light(name: &str, moves: bool) {
+    let Some(scene) = shared_scene(name).map(Arc::new) else { return };
     let radius_m = scene.auto_radius_m();
     // Six points, of which three stay, in a square with the occlusion distance as its side.
     let mut config = config(6.0 / (radius_m * radius_m), 16);

@@ -3,22 +3,11 @@
 
 mod common;
 
-use std::path::{Path, PathBuf};
-
-use common::shared;
+use common::shared_scene;
 use dapple_scene::glam::{DVec3, Vec3};
-use dapple_scene::{AlphaMode, Files, Pose, Scene};
+use dapple_scene::{AlphaMode, NoFiles, Pose, Scene};
 use dapple_trace::sampling::{fixed_pattern, hash, orthonormal_basis, unit_interval};
 use dapple_trace::{Ray, Tracer, offset_origin};
-
-/// The files beside a scene.
-struct Folder(PathBuf);
-
-impl Files for Folder {
-    fn read(&self, uri: &str, _limit_bytes: u64) -> std::io::Result<Vec<u8>> {
-        std::fs::read(self.0.join(uri))
-    }
-}
 
 /// All triangles in the world, in `f64` but for the vertices' own rounding.
 fn world_triangles(scene: &Scene, pose: &Pose) -> Vec<[DVec3; 3]> {
@@ -132,7 +121,7 @@ fn check(name: &str, scene: Scene) {
 fn built_in_scenes_agree_with_brute_force() {
     for builtin in dapple_scene::builtin::BUILTINS {
         let glb = dapple_scene::builtin::glb(builtin.name, 0.1).unwrap();
-        check(builtin.name, dapple_scene::load("scene.glb", &glb, &dapple_scene::NoFiles).unwrap());
+        check(builtin.name, dapple_scene::load("scene.glb", &glb, &NoFiles).unwrap());
     }
 }
 
@@ -160,9 +149,7 @@ fn scenes_by_others_agree_with_brute_force() {
         "scenes/anim-AnimatedMorphSphere/AnimatedMorphSphere.glb",
         "scenes/anim-MorphStressTest/morph-stress-test.glb",
     ] {
-        let Some(file) = shared(path) else { return };
-        let folder = Folder(file.parent().unwrap_or(Path::new("")).to_owned());
-        let name = file.file_name().unwrap().to_string_lossy();
-        check(path, dapple_scene::load(&name, &std::fs::read(&file).unwrap(), &folder).unwrap());
+        let Some(scene) = shared_scene(path) else { return };
+        check(path, scene);
     }
 }

@@ -5,13 +5,13 @@
 pub(crate) mod command;
 pub(crate) mod made;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use dapple_client::{Client, Drawn, PictureParams};
 use dapple_metrics::psnr_masked;
 use dapple_render::shade::ShadeParams;
-use dapple_scene::{NoFiles, Scene, builtin};
+use dapple_scene::{Files, NoFiles, Scene, builtin};
 use dapple_server::{Server, ServerConfig};
 use dapple_store::points::PointStore;
 use dapple_stream::{Limits, Publisher, PublisherConfig};
@@ -92,6 +92,23 @@ pub(crate) fn covered(drawn: &Drawn) -> Vec<bool> {
 /// PSNR in dB of visibility over the samples that show a surface.
 pub(crate) fn visibility_psnr_db(drawn: &Drawn, truth: &[f32], test: &[f32]) -> f64 {
     psnr_masked(truth, test, &covered(drawn), 1.0).unwrap()
+}
+
+/// The files beside a scene.
+struct Folder(PathBuf);
+
+impl Files for Folder {
+    fn read(&self, uri: &str, _limit_bytes: u64) -> std::io::Result<Vec<u8>> {
+        std::fs::read(self.0.join(uri))
+    }
+}
+
+/// A scene of the shared test files; says so where it is absent.
+pub(crate) fn shared_scene(path: &str) -> Option<Scene> {
+    let file = shared(path)?;
+    let folder = Folder(file.parent().unwrap_or(Path::new("")).to_owned());
+    let name = file.file_name().unwrap().to_string_lossy();
+    Some(dapple_scene::load(&name, &std::fs::read(&file).unwrap(), &folder).unwrap())
 }
 
 /// A file of the shared test files; says so where it is absent.

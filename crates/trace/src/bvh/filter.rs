@@ -108,6 +108,9 @@ impl<S: Simd> Block<S> {
         let reach = coordinate + t_max * direction_max * HEADROOM;
         let mut reach_error =
             (edge2 * reach).mul_add(REACH_ERROR, UNDERFLOW * (1.0 + direction_max * (1.0 + t_max)));
+        // N · d may overflow where its product with a tiny t_max would not; then so does the bound of the planes, and
+        // neither is to decide (∞ × 0 is no number, and compares with none).
+        reach_error += edge_error * 0.0;
         let mut sign = volume;
         let unsure = !volume.abs().simd_gt(volume_error).to_bitmask() as u32 & lanes;
         if unsure != 0 {

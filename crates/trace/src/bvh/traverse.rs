@@ -12,9 +12,6 @@ use super::stack::Stack;
 use super::tree::{CONSERVATIVE, Child, Node, TINY, Tree, WIDTH};
 use super::triangle::QuickRay;
 
-/// A ray against the eight children of a node costs about as much as eight rays against one child.
-const CHUNK_COST: u32 = 1;
-
 /// The boxes of a node's children relative to the origin: smallest x, y, z, then largest.
 pub(crate) struct Boxes<S: Simd> {
     pub(crate) planes: [f32x8<S>; 6],
@@ -271,7 +268,8 @@ fn rays_by_child<S: Simd>(
     mut slots: u32,
     through: &mut [u64; WIDTH],
 ) {
-    if rays.count_ones() >= CHUNK_COST * slots.count_ones() * active_chunks(rays) {
+    // A ray against eight children costs about as much as eight rays against one child.
+    if rays.count_ones() >= slots.count_ones() * active_chunks(rays) {
         let planes = boxes.spread();
         while slots != 0 {
             let slot = slots.trailing_zeros() as usize;

@@ -6,7 +6,7 @@ use glam::Quat;
 
 use super::motion::{self, FRAMES, SECONDS};
 use super::plan::{CEILING, ROOM, solids};
-use crate::builtin::tests::document::{self, point_triangle_distance, read, still_triangles, triangle_count};
+use crate::builtin::tests::document::{self, point_triangle_distance, read, still_triangles};
 use crate::builtin::{glb, path, physics};
 
 const DETAIL: f32 = 0.1;
@@ -19,33 +19,9 @@ fn is_sheet(name: &str) -> bool {
 }
 
 #[test]
-fn same_bytes_twice() {
-    assert!(glb("atrium", DETAIL).expect("again") == *SMALL);
-}
-
-/// Guards the promise of equal bytes on every machine. Renew the hash when the scene is changed on purpose (the failure
-/// message tells it); a change without that is a loss of determinism or a changed dependency.
-#[test]
-fn bytes_are_as_recorded() {
-    assert_eq!(
-        blake3::hash(&SMALL).to_hex().as_str(),
-        "9061cd8174b7a2159fce26a55f6a27b88f24598cc6dff9b930318431bc1cacc8"
-    );
-}
-
-#[test]
-fn triangle_counts_follow_detail() {
-    let full = triangle_count(&read(&glb("atrium", 1.0).expect("full atrium")));
-    let small = triangle_count(&read(&SMALL));
-    eprintln!("triangles: {full} at detail 1, {small} at detail {DETAIL}");
-    assert!((100_000..=300_000).contains(&full), "{full}");
-    assert!((3_000..=40_000).contains(&small), "{small}");
-}
-
-#[test]
-fn layout_does_not_depend_on_detail() {
-    let other = read(&glb("atrium", 0.2).expect("atrium"));
-    assert_eq!(document::layout(&read(&SMALL)), document::layout(&other));
+fn bytes_layout_and_triangle_counts_are_as_promised() {
+    let hash = "9061cd8174b7a2159fce26a55f6a27b88f24598cc6dff9b930318431bc1cacc8";
+    document::assert_promises("atrium", DETAIL, hash, 100_000..=300_000, 3_000..=40_000);
 }
 
 #[test]

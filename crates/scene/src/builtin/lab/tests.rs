@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use super::plan::{CEILING, FRAMES, SECONDS};
 use super::{motion, solids};
-use crate::builtin::tests::document::{self, point_triangle_distance, read, still_triangles, triangle_count};
+use crate::builtin::tests::document::{self, point_triangle_distance, read, still_triangles};
 use crate::builtin::{glb, path};
 use crate::{Aabb, NoFiles, Scene};
 
@@ -24,32 +24,9 @@ fn turns(name: &str) -> bool {
 }
 
 #[test]
-fn same_bytes_twice() {
-    assert!(glb("lab", DETAIL).expect("again") == *SMALL);
-}
-
-/// As for the atrium: renew the hash when the scene is changed on purpose.
-#[test]
-fn bytes_are_as_recorded() {
-    assert_eq!(
-        blake3::hash(&SMALL).to_hex().as_str(),
-        "a32906e4ce84098edce6d5a2173ba8d2978e11933b653fa8b69640ce3b349a7b"
-    );
-}
-
-#[test]
-fn triangle_counts_follow_detail() {
-    let full = triangle_count(&read(&glb("lab", 1.0).expect("full laboratory")));
-    let small = triangle_count(&read(&SMALL));
-    eprintln!("triangles: {full} at detail 1, {small} at detail {DETAIL}");
-    assert!((250_000..=400_000).contains(&full), "{full}");
-    assert!((20_000..=100_000).contains(&small), "{small}");
-}
-
-#[test]
-fn layout_does_not_depend_on_detail() {
-    let other = read(&glb("lab", 0.2).expect("laboratory"));
-    assert_eq!(document::layout(&read(&SMALL)), document::layout(&other));
+fn bytes_layout_and_triangle_counts_are_as_promised() {
+    let hash = "a32906e4ce84098edce6d5a2173ba8d2978e11933b653fa8b69640ce3b349a7b";
+    document::assert_promises("lab", DETAIL, hash, 250_000..=400_000, 20_000..=100_000);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use glam::{Mat4, Vec3};
 
 use super::motion;
 use super::plan::{FRAMES, SECONDS, rocks};
-use crate::builtin::tests::document::{self, point_triangle_distance, read, still_triangles, triangle_count};
+use crate::builtin::tests::document::{self, point_triangle_distance, read, still_triangles};
 use crate::builtin::{glb, path};
 use crate::{Aabb, NoFiles, Scene};
 
@@ -23,32 +23,9 @@ fn is_rock(name: &str) -> bool {
 }
 
 #[test]
-fn same_bytes_twice() {
-    assert!(glb("station", DETAIL).expect("again") == *SMALL);
-}
-
-/// As for the atrium: renew the hash when the scene is changed on purpose.
-#[test]
-fn bytes_are_as_recorded() {
-    assert_eq!(
-        blake3::hash(&SMALL).to_hex().as_str(),
-        "6f9849ffd3fed6c48ea55f34f36e232d680b9639f964d517284ebff4d39de334"
-    );
-}
-
-#[test]
-fn triangle_counts_follow_detail() {
-    let full = triangle_count(&read(&glb("station", 1.0).expect("full station")));
-    let small = triangle_count(&read(&SMALL));
-    eprintln!("triangles: {full} at detail 1, {small} at detail {DETAIL}");
-    assert!((200_000..=300_000).contains(&full), "{full}");
-    assert!((8_000..=60_000).contains(&small), "{small}");
-}
-
-#[test]
-fn layout_does_not_depend_on_detail() {
-    let other = read(&glb("station", 0.2).expect("station"));
-    assert_eq!(document::layout(&read(&SMALL)), document::layout(&other));
+fn bytes_layout_and_triangle_counts_are_as_promised() {
+    let hash = "6f9849ffd3fed6c48ea55f34f36e232d680b9639f964d517284ebff4d39de334";
+    document::assert_promises("station", DETAIL, hash, 200_000..=300_000, 8_000..=60_000);
 }
 
 #[test]

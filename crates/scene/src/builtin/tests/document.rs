@@ -1,8 +1,11 @@
 //! What the tests of all built-in scenes read from their files.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
 use glam::{Mat4, Vec3};
+
+use crate::builtin::glb;
 
 /// A built-in scene as its file says it.
 pub(in crate::builtin) struct Doc {
@@ -17,8 +20,32 @@ pub(in crate::builtin) fn read(bytes: &[u8]) -> Doc {
     Doc { gltf, bin }
 }
 
+/// What every built-in scene promises: the same bytes twice and on every machine (`hash`, of the scene at `detail`), triangles
+/// within these ranges at full and at that detail, and a layout that no detail changes.
+///
+/// Renew the hash when the scene is changed on purpose (the failure message tells it); a change without that is a loss of
+/// determinism or a changed dependency.
+pub(in crate::builtin) fn assert_promises(
+    name: &str,
+    detail: f32,
+    hash: &str,
+    full: RangeInclusive<usize>,
+    small: RangeInclusive<usize>,
+) {
+    let make = |detail: f32| glb(name, detail).expect("a built-in scene");
+    let bytes = make(detail);
+    assert!(make(detail) == bytes, "{name} differs from one time to the next");
+    assert_eq!(blake3::hash(&bytes).to_hex().as_str(), hash, "{name}");
+
+    let doc = read(&bytes);
+    let counts = [triangle_count(&read(&make(1.0))), triangle_count(&doc)];
+    eprintln!("{name}: {} triangles at detail 1, {} at detail {detail}", counts[0], counts[1]);
+    assert!(full.contains(&counts[0]) && small.contains(&counts[1]), "{name}: {counts:?}");
+    assert_eq!(layout(&doc), layout(&read(&make(0.2))), "{name}");
+}
+
 /// Triangles, each mesh counted as often as it is placed.
-pub(in crate::builtin) fn triangle_count(doc: &Doc) -> usize {
+fn triangle_count(doc: &Doc) -> usize {
     let of_mesh = |m: gltf::Mesh<'_>| -> usize {
         m.primitives().map(|p| p.indices().expect("indexed").count() / 3).sum()
     };
@@ -68,7 +95,7 @@ pub(in crate::builtin) fn point_triangle_distance(p: Vec3, [a, b, c]: [Vec3; 3])
 }
 
 /// Names and transforms of all nodes.
-pub(in crate::builtin) fn layout(doc: &Doc) -> Vec<(String, Mat4)> {
+fn layout(doc: &Doc) -> Vec<(String, Mat4)> {
     let of = |n: gltf::Node<'_>| {
         (n.name().unwrap_or("").to_string(), Mat4::from_cols_array_2d(&n.transform().matrix()))
     };
