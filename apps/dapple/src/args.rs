@@ -1,5 +1,6 @@
 //! Command-line arguments.
 
+mod eval;
 mod view;
 mod watch;
 
@@ -9,6 +10,7 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
 
+pub(crate) use eval::{EvalArgs, Options};
 pub(crate) use view::{Preset, ViewArgs, ViewKind};
 pub(crate) use watch::{DemoArgs, InspectArgs, LightArgs, RecordArgs};
 
@@ -23,7 +25,7 @@ pub(crate) struct Cli {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Run server and client along a camera path and compare the pictures with ray-traced truth.
-    #[command(after_help = EVAL_EXAMPLES)]
+    #[command(after_help = eval::EVAL_EXAMPLES)]
     Eval(EvalArgs),
     /// Render one picture of a scene.
     #[command(after_help = RENDER_EXAMPLES)]
@@ -47,15 +49,6 @@ pub(crate) enum Command {
     #[command(after_help = watch::DEMO_EXAMPLES)]
     Demo(DemoArgs),
 }
-
-const EVAL_EXAMPLES: &str = "\
-Examples:
-  dapple eval                                    a small built-in setting, under a minute on two cores
-  dapple eval room.glb --radius auto --out out/room
-  dapple eval --builtin atrium --points 512,1024 --hz 15,60 --size 960x540 --frames 8 --path path-walk
-  dapple eval --smoke                            assert the bounds that the tests assert
-
-DIR/results.json, DIR/report.html and the pictures are written; docs/evaluation.md describes the columns.";
 
 const RENDER_EXAMPLES: &str = "\
 Examples:
@@ -112,7 +105,7 @@ pub(crate) struct VisibilityArgs {
 }
 
 /// What a server spends on each of its steps.
-#[derive(Debug, Clone, Copy, Default, Args)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 pub(crate) struct StepArgs {
     /// Rays a server step may take, spent first on what is seen, on what changes and on what has waited; the rest is done
     /// in later steps [default: as many as it takes].
@@ -122,58 +115,6 @@ pub(crate) struct StepArgs {
     /// leaves over; 0: no more than --point-rays. Without --ray-budget the first steps are as slow as the start.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) rays_still: u32,
-}
-
-#[derive(Debug, Clone, Args)]
-pub(crate) struct EvalArgs {
-    #[command(flatten)]
-    pub(crate) scene: SceneChoice,
-    /// Methods to compare: psao, psao-hat (the paper's kernel on the same points; psao-hat-1.5: with 1.5 times its
-    /// radius), rtao-R (R rays a pixel), none [default: psao,psao-hat,rtao-16,none].
-    #[arg(long, value_delimiter = ',', value_name = "METHOD,…")]
-    pub(crate) methods: Option<Vec<Method>>,
-    /// Pictures compared, evenly spread over the path [default: 4; 2 without a scene].
-    #[arg(long, value_name = "N")]
-    pub(crate) frames: Option<u32>,
-    /// Picture size in pixels [default: 480x270].
-    #[arg(long, value_name = "WxH")]
-    pub(crate) size: Option<Size>,
-    /// Points spawned a square metre (half are kept); several are evaluated in one run
-    /// [default: 512; 256 without a scene].
-    #[arg(long, value_delimiter = ',', value_name = "N,…")]
-    pub(crate) points: Option<Vec<f32>>,
-    /// Server updates a second; several are evaluated in one run [default: 15].
-    #[arg(long, value_delimiter = ',', value_name = "H,…")]
-    pub(crate) hz: Option<Vec<f64>>,
-    /// Camera path by name (an unknown name lists them) [default: the scene's first].
-    #[arg(long, value_name = "NAME")]
-    pub(crate) path: Option<String>,
-    /// Seconds of the path that are played [default: all of it; 2 without a scene].
-    #[arg(long, value_name = "S")]
-    pub(crate) seconds: Option<f64>,
-    /// Rays a pixel of the ray-traced truth [default: 512; 128 without a scene].
-    #[arg(long, value_name = "R")]
-    pub(crate) reference_rays: Option<u32>,
-    /// Samples a pixel along each axis; 2 is 4× supersampling [default: 2].
-    #[arg(long, value_name = "N")]
-    pub(crate) supersample: Option<u32>,
-    #[command(flatten)]
-    pub(crate) visibility: VisibilityArgs,
-    #[command(flatten)]
-    pub(crate) step: StepArgs,
-    /// Folder for results, report and pictures.
-    #[arg(long, value_name = "DIR", default_value = "out/eval")]
-    pub(crate) out: PathBuf,
-    /// Run the small built-in setting and fail if similarity or bytes leave their bounds.
-    #[arg(long, conflicts_with_all = [
-        "scene", "builtin", "detail", "animation", "methods", "frames", "size", "points", "hz", "path", "seconds",
-        "reference_rays", "supersample", "radius", "point_rays", "threshold", "seed",
-        "ray_budget", "rays_still",
-    ])]
-    pub(crate) smoke: bool,
-    /// Threads; 0 is one for each core.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(crate) threads: usize,
 }
 
 #[derive(Debug, Clone, Args)]

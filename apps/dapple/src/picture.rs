@@ -5,10 +5,11 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use dapple_client::Drawn;
-use dapple_metrics::{PIXELS_PER_DEGREE, flip, psnr, psnr_masked, ssim};
+use dapple_metrics::{Lpips, PIXELS_PER_DEGREE, flip, flip_hdr, magma_srgb8, psnr, psnr_masked, ssim};
 use dapple_render::compose::{ErrorKind, ResolvedPlane, resolve_plane, view_error, view_visibility};
 use dapple_render::image::{Rgb8Image, ToneMap};
 use dapple_scene::Scene;
+use dapple_scene::glam::Vec3;
 use dapple_trace::rtao::Site;
 
 /// Writes a whole file: into a neighbour first, then renamed over the old one.
@@ -57,6 +58,8 @@ pub(crate) fn write_png(path: &Path, width: u32, height: u32, rgb8: &[[u8; 3]]) 
 pub(crate) struct Shown {
     pub(crate) width: u32,
     pub(crate) height: u32,
+    /// Before tone mapping.
+    radiance: Vec<Vec3>,
     beauty: Vec<[u8; 3]>,
     visibility_picture: Vec<[u8; 3]>,
     visibility: ResolvedPlane,
@@ -83,18 +86,35 @@ impl Shown {
                 &open
             }
         };
-        let beauty = drawn.compose(visibility)?.to_rgb8(&ToneMap::default());
+        let radiance = drawn.compose(visibility)?;
+        let beauty = radiance.to_rgb8(&ToneMap::default());
         let visibility = resolve_plane(gbuffer, samples, 1.0)?;
         let covered: Vec<bool> = visibility.coverage.values.iter().map(|&c| c > 0.0).collect();
         Ok(Shown {
             width: beauty.width,
             height: beauty.height,
+            radiance: radiance.pixels,
             beauty: beauty.pixels,
             visibility_picture: view_visibility(gbuffer, samples)?.pixels,
             visibility,
             covered_pixels: covered.iter().filter(|c| **c).count(),
             covered,
         })
+    }
+
+    /// Visibility of each pixel, over its samples that show geometry; 1 where none does.
+    pub(crate) fn visibility(&self) -> &[f32] {
+        &self.visibility.values.values
+    }
+
+    /// The same, without the rest.
+    pub(crate) fn into_visibility(self) -> Vec<f32> {
+        self.visibility.values.values
+    }
+
+    /// Whether each pixel shows any geometry.
+    pub(crate) fn covered(&self) -> &[bool] {
+        &self.covered
     }
 
     /// Writes `STEM-beauty.png` and `STEM-visibility.png`.
@@ -107,6 +127,13 @@ impl Shown {
     }
 }
 
+/// What is computed beside PSNR, SSIM and FLIP.
+#[derive(Default)]
+pub(crate) struct Judges {
+    pub(crate) lpips: Option<Lpips>,
+    pub(crate) hdr_flip: bool,
+}
+
 /// One picture against the truth.
 pub(crate) struct Compared {
     /// PSNR of visibility over the pixels that show geometry; `None` if none does, infinite if equal.
@@ -115,11 +142,20 @@ pub(crate) struct Compared {
     pub(crate) psnr_db: f64,
     pub(crate) ssim: f64,
     pub(crate) flip: f64,
+    pub(crate) hdr_flip: Option<f64>,
+    pub(crate) lpips: Option<f64>,
     error: Rgb8Image,
+    flip_map: Vec<f32>,
+}
+
+/// Names of the maps that were written, relative to their folder.
+pub(crate) struct Maps {
+    pub(crate) error: String,
+    pub(crate) flip: String,
 }
 
 impl Compared {
-    pub(crate) fn new(truth: &Shown, test: &Shown) -> Result<Compared> {
+    pub(crate) fn new(truth: &Shown, test: &Shown, judges: &Judges) -> Result<Compared> {
         let (width, height) = (truth.width, truth.height);
         let (truth_v, test_v) = (&truth.visibility.values, &test.visibility.values);
         let visibility_psnr_db = match truth.covered_pixels {
@@ -128,20 +164,37 @@ impl Compared {
         };
         let [truth_rgb, test_rgb] = [&truth.beauty, &test.beauty].map(|p| p.as_flattened());
         let unit = |bytes: &[u8]| bytes.iter().map(|&b| f32::from(b) / 255.0).collect::<Vec<f32>>();
+        let flip = flip(width, height, truth_rgb, test_rgb, PIXELS_PER_DEGREE)?;
+        let linear = |shown: &Shown| shown.radiance.iter().flat_map(|p| p.to_array()).collect::<Vec<f32>>();
+        let hdr_flip = match judges.hdr_flip {
+            false => None,
+            true => {
+                let found = flip_hdr(width, height, &linear(truth), &linear(test), PIXELS_PER_DEGREE, None)?;
+                Some(found.mean)
+            }
+        };
+        let lpips = judges.lpips.as_ref().map(|lpips| lpips.distance(width, height, truth_rgb, test_rgb));
         Ok(Compared {
             visibility_psnr_db,
             psnr_db: psnr(&unit(truth_rgb), &unit(test_rgb), 1.0)?,
             ssim: ssim(width, height, &luma(&truth.beauty), &luma(&test.beauty))?,
-            flip: flip(width, height, truth_rgb, test_rgb, PIXELS_PER_DEGREE)?.mean,
+            flip: flip.mean,
+            hdr_flip,
+            lpips: lpips.transpose()?,
             error: view_error(truth_v, test_v, &truth.visibility.coverage, ErrorKind::Signed)?,
+            flip_map: flip.error_map,
         })
     }
 
-    /// Writes `STEM-error.png`, the difference in visibility, and returns its name.
-    pub(crate) fn write_error(&self, folder: &Path, stem: &str) -> Result<String> {
-        let name = format!("{stem}-error.png");
-        write_png(&folder.join(&name), self.error.width, self.error.height, &self.error.pixels)?;
-        Ok(name)
+    /// Writes `STEM-error.png`, the difference in visibility, and `STEM-flip.png`, FLIP as a heat map.
+    pub(crate) fn write(&self, folder: &Path, stem: &str) -> Result<Maps> {
+        let maps = Maps { error: format!("{stem}-error.png"), flip: format!("{stem}-flip.png") };
+        let (width, height) = (self.error.width, self.error.height);
+        write_png(&folder.join(&maps.error), width, height, &self.error.pixels)?;
+        let heat = magma_srgb8(&self.flip_map);
+        let pixels: Vec<[u8; 3]> = heat.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
+        write_png(&folder.join(&maps.flip), width, height, &pixels)?;
+        Ok(maps)
     }
 }
 

@@ -112,7 +112,12 @@ pub(crate) fn find_camera(
 
 /// The occlusion distance in metres, and the factor on points per m² that goes with it.
 pub(crate) fn resolve_radius(scene: &Scene, args: &VisibilityArgs) -> Result<(f32, f32)> {
-    match args.radius {
+    radius_of(scene, args.radius)
+}
+
+/// The same of a radius alone.
+pub(crate) fn radius_of(scene: &Scene, radius: Radius) -> Result<(f32, f32)> {
+    match radius {
         Radius::Metres(m) => Ok((m, 1.0)),
         Radius::Auto => {
             let radius = scene.auto_radius_m();

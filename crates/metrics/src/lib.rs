@@ -13,6 +13,8 @@
 mod error;
 mod flip;
 mod psnr;
+mod shim;
+pub use shim::*;
 mod ssim;
 #[cfg(test)]
 mod test_images;

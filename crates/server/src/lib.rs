@@ -80,7 +80,8 @@ pub struct StepReport {
     pub changed: u32,
 }
 
-/// A scene that is being lit.
+/// A scene that is being lit. A clone goes on from the same state by itself.
+#[derive(Clone)]
 pub struct Server {
     scene: Arc<Scene>,
     tracer: Tracer,

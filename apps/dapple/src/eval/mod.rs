@@ -1,43 +1,63 @@
-//! `dapple eval`: server and client in one process along a camera path, against ray-traced truth.
+//! `dapple eval`: server and client in one process along camera paths, against ray-traced truth.
+//!
+//! A [`plan`] of scenes and settings is run case by case (a scene along a path: [`stage`]) and job by job (one server with all
+//! methods that look it up: [`job`]). Truth is kept in files ([`truth`]), finished jobs in a [`journal`], so that a stopped run continues.
 
+mod advice;
+mod export;
+mod figures;
+mod job;
+mod journal;
+mod pair;
+mod plan;
 pub(crate) mod quality;
 mod report;
 mod results;
 mod run;
 mod samples;
-mod settings;
+mod settle;
 mod smoke;
+mod stage;
+mod still;
 mod table;
 mod thin;
+mod truth;
+mod work;
 
-use anyhow::Result;
+use std::path::Path;
+
+use anyhow::{Context, Result};
 
 use crate::args::EvalArgs;
 use crate::picture::write_file;
-use crate::source;
 
-use settings::Settings;
+use plan::Plan;
+use results::Results;
 
 /// Runs an evaluation and writes results, report and pictures.
 pub(crate) fn run(args: &EvalArgs) -> Result<()> {
-    let loaded = source::load(&args.scene, Some(settings::DEFAULT_SCENE))?;
-    let settings = Settings::new(args, &loaded)?;
+    let plan = Plan::new(args)?;
     std::fs::create_dir_all(&args.out)
-        .map_err(|e| anyhow::anyhow!("cannot create the folder {}: {e}", args.out.display()))?;
-    say!("{}", settings.summary(&loaded));
-
-    let results = run::evaluate(&loaded, &settings, &args.out)?;
-
-    say!("\n{}", table::text(&results));
-    let json = serde_json::to_vec_pretty(&results)?;
-    write_file(&args.out.join("results.json"), &json)?;
-    let report = args.out.join("report.html");
-    write_file(&report, report::html(&results).as_bytes())?;
-    let shown = std::fs::canonicalize(&report).unwrap_or(report);
-    say!("report: {}", shown.display());
+        .with_context(|| format!("cannot create the folder {}", args.out.display()))?;
+    let results = run::evaluate(&plan, args)?;
+    say!("{}", table::text(&results));
+    write(&results, &args.out)?;
     if args.smoke {
         smoke::check(&results)?;
         say!("smoke: all bounds hold");
     }
+    Ok(())
+}
+
+/// Writes everything but the pictures, and says where the report lies.
+fn write(results: &Results, out: &Path) -> Result<()> {
+    write_file(&out.join("results.json"), &serde_json::to_vec_pretty(results)?)?;
+    write_file(&out.join("results.csv"), &export::rows_csv(results)?)?;
+    write_file(&out.join("frames.csv"), &export::frames_csv(results)?)?;
+    write_file(&out.join("results.md"), table::markdown(results).as_bytes())?;
+    let report = out.join("report.html");
+    write_file(&report, report::html(results, out)?.as_bytes())?;
+    let shown = std::fs::canonicalize(&report).unwrap_or(report);
+    say!("report: {}", shown.display());
     Ok(())
 }

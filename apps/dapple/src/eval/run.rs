@@ -1,380 +1,349 @@
-//! The evaluation itself: all servers advance together, each picture is compared while it is in memory.
+//! Runs a plan: scene by scene, path by path, job by job. What was done before is taken from the journal.
 
-use std::path::Path;
-use std::time::Instant;
+use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
-use dapple_client::{Client, Drawn, PictureParams, Reconstruction, draw};
-use dapple_render::psao::{Hat, Kernel};
-use dapple_scene::Pose;
-use dapple_server::{Progress, Server, ServerConfig};
-use dapple_stream::Limits;
-use dapple_trace::Tracer;
-use dapple_trace::psao::generate::{GenerateParams, generate_points};
-use dapple_trace::psao::update::{ConvexVolume, StepInput, UpdateParams};
-use dapple_trace::rtao::{RtaoParams, trace_visibility_with_progress};
+use anyhow::{Context, Result, bail};
+use dapple_metrics::Lpips;
+use dapple_scene::{CameraPath, CameraSource};
+use serde_json::json;
 
-use super::results::{
-    FrameRow, Machine, Params, PooledError, Results, Row, RunInfo, SceneInfo, Steps, commit,
-};
-use super::settings::Settings;
-use crate::args::Method;
-use crate::picture::{Compared, Shown, sites};
-use crate::progress::Bar;
-use crate::source::Loaded;
+use super::advice;
+use super::figures::FrameError;
+use super::job::{Desk, Job, Outcome, jobs};
+use super::journal::Journal;
+use super::pair::Starts;
+use super::plan::{Entry, Plan};
+use super::results::{Advice, Case, Machine, Results, RunInfo, SCHEMA, SceneInfo, Truth, TruthFrame, commit};
+use super::stage::Stage;
+use super::truth::Cache;
+use super::work::Work;
+use crate::args::EvalArgs;
+use crate::picture::{Judges, write_file};
+use crate::source::{self, Loaded, read_limited};
 
-/// A server at one density and rate, and its client.
-struct Pair {
-    points_per_m2: f32,
-    hz: f64,
-    server: Server,
-    client: Client,
-    ticks: u64,
-    delta_bytes: u64,
-    snapshot_bytes: u64,
-    rays: u64,
-    steps: Steps,
-    server_seconds: f64,
-    apply_seconds: f64,
+/// The largest file of weights that is read.
+const MAX_WEIGHTS_BYTES: u64 = 256 << 20;
+
+/// What all cases of a run share.
+struct Run<'a> {
+    out: &'a Path,
+    journal: Journal,
+    cache: Cache,
+    judges: Judges,
+    /// Of the weights for LPIPS.
+    weights_hash: Option<String>,
+    record: Option<&'a Path>,
+    /// Whether there is one scene along one path.
+    one_case: bool,
+    /// Jobs that found their outcome in the journal.
+    reused: usize,
+    work: Work,
 }
 
-impl Pair {
-    /// Ticks up to and including `until_s`; the client takes every frame.
-    fn advance(&mut self, until_s: f64, settings: &Settings) -> Result<()> {
-        loop {
-            let tick_s = (self.ticks + 1) as f64 / self.hz;
-            // The sum of many ticks must not lose the last one to rounding.
-            if tick_s > until_s + 1e-9 {
-                return Ok(());
-            }
-            self.ticks += 1;
-            let interest = self.interest(tick_s, settings);
-            let input = StepInput { ray_budget: settings.step.ray_budget, interest: &interest };
-            let start = Instant::now();
-            let report = self.server.step_with(tick_s, &input)?;
-            self.server_seconds += start.elapsed().as_secs_f64();
-            self.rays += report.rays;
-            self.steps.add(&report.counts);
-            let start = Instant::now();
-            if let Some(frame) = &report.frame {
-                self.delta_bytes += frame.bytes.len() as u64;
-                self.client.receive(&frame.bytes).context("the client refused the server's frame")?;
-            }
-            self.apply_seconds += start.elapsed().as_secs_f64();
+pub(super) fn evaluate(plan: &Plan, args: &EvalArgs) -> Result<Results> {
+    let (lpips, weights_hash) = match &args.lpips_weights {
+        None => (None, None),
+        Some(path) => {
+            let bytes = read_limited(path, MAX_WEIGHTS_BYTES)
+                .with_context(|| format!("cannot read the weights {}", path.display()))?;
+            let lpips = Lpips::from_safetensors(&bytes).with_context(|| path.display().to_string())?;
+            (Some(lpips), Some(blake3::hash(&bytes).to_hex()[..16].to_owned()))
         }
-    }
-
-    /// What the viewer sees by the next tick, where a budget asks for it.
-    fn interest(&self, tick_s: f64, settings: &Settings) -> Vec<ConvexVolume> {
-        if settings.step.ray_budget.is_none() {
-            return Vec::new();
-        }
-        let scene = self.server.scene();
-        let aspect = settings.size.width as f32 / settings.size.height as f32;
-        let frustum = |time_s: f64| {
-            let camera = settings.path.camera(scene, &scene.pose_undeformed(time_s));
-            ConvexVolume::frustum(&camera, aspect, f32::INFINITY, settings.radius_m)
-        };
-        vec![frustum(tick_s), frustum(tick_s + 1.0 / self.hz)]
-    }
-}
-
-/// One line of the table while it grows.
-struct Line {
-    method: Method,
-    pair: Option<usize>,
-    file_stem: String,
-    visibility_error: PooledError,
-    error: PooledError,
-    reconstruct_seconds: f64,
-    rays: u64,
-    frames: Vec<FrameRow>,
-}
-
-pub(super) fn evaluate(loaded: &Loaded, settings: &Settings, out: &Path) -> Result<Results> {
-    let scene = &loaded.scene;
-    let rest_pose = scene.pose(0.0);
-    let mut tracer = Tracer::new(scene, &rest_pose);
-    let mut pairs = start_servers(loaded, settings, &rest_pose, &tracer)?;
-    let mut lines = lines(settings, &pairs);
-    let picture_params = PictureParams {
-        width: settings.size.width,
-        height: settings.size.height,
-        supersample: settings.supersample,
-        shade: Default::default(),
     };
-
-    let frames = settings.frame_times_s.len();
-    let bar = Bar::new("frames", (frames * 100) as u64);
-    for (number, &time_s) in settings.frame_times_s.iter().enumerate() {
-        bar.message(&format!("frame {} of {frames}: server", number + 1));
-        for pair in &mut pairs {
-            pair.advance(time_s, settings)?;
-        }
-        bar.message(&format!("frame {} of {frames}: truth", number + 1));
-        let pose = scene.pose(time_s);
-        tracer.update(scene, &pose);
-        let camera = settings.path.camera(scene, &pose);
-        let drawn = draw(scene, &camera, time_s, &picture_params)?;
-        let truth_rays = settings.rays_per_sample(settings.reference_rays);
-        let traced = |done: u64, of: usize| bar.set((number * 100) as u64 + done * 80 / of.max(1) as u64);
-        let truth = trace_samples(loaded, &tracer, &drawn, truth_rays, settings, 0, &traced);
-        let truth = Shown::new(&drawn, Some(&truth))?;
-        if truth.covered_pixels == 0 {
-            tracing::warn!(
-                "frame {number} at {time_s:.3} s shows no geometry: its visibility is not compared"
-            );
-        }
-        truth.write(out, &format!("{number:03}-truth"))?;
-        for (index, line) in lines.iter_mut().enumerate() {
-            bar.message(&format!("frame {} of {frames}: {}", number + 1, line.file_stem));
-            line.compare(loaded, settings, &pairs, &tracer, &drawn, &truth, (number, time_s), out)?;
-            bar.set((number * 100 + 80 + (index + 1) * 20 / lines_len(settings, &pairs).max(1)) as u64);
-        }
+    if let Some(record) = &args.record
+        && !record.extension().is_some_and(|e| e.eq_ignore_ascii_case("dapple"))
+    {
+        bail!("--record {} would hold a recording: name it .dapple", record.display());
     }
-    bar.message("server to the end of the path");
-    for pair in &mut pairs {
-        pair.advance(settings.seconds, settings)?;
+    let truth = args.truth_cache.clone().unwrap_or_else(|| args.out.join("truth"));
+    let mut run = Run {
+        out: &args.out,
+        journal: Journal::open(&args.out, args.fresh)?,
+        cache: Cache::new(&truth),
+        judges: Judges { lpips, hdr_flip: false },
+        weights_hash,
+        record: args.record.as_deref(),
+        one_case: false,
+        reused: 0,
+        work: Work::new(),
+    };
+    let mut cases: Vec<Case> = Vec::new();
+    for entry in &plan.entries {
+        run.entry(entry, plan, &mut cases).with_context(|| entry.name.clone())?;
     }
-    drop(bar);
-    let rows = lines.into_iter().map(|line| line.finish(settings, &pairs)).collect();
-    Ok(results(loaded, settings, rows))
-}
-
-/// Rays at every covered sample; open where there is nothing.
-pub(super) fn trace_samples(
-    loaded: &Loaded,
-    tracer: &Tracer,
-    drawn: &Drawn,
-    rays: u32,
-    settings: &Settings,
-    stream: u64,
-    progress: &(dyn Fn(u64, usize) + Sync),
-) -> Vec<f32> {
-    let (indices, sites) = sites(&loaded.scene, drawn);
-    let seed = u64::from(settings.seed) << 8 | stream;
-    let params = RtaoParams { rays, radius_m: settings.radius_m, seed };
-    let mut traced = vec![1.0; sites.len()];
-    let count = sites.len();
-    trace_visibility_with_progress(tracer, &sites, &params, &mut traced, &|done| progress(done, count));
-    let mut visibility = vec![1.0; drawn.gbuffer.samples().len()];
-    for (index, value) in indices.into_iter().zip(traced) {
-        visibility[index] = value;
+    let advice = cases.iter().enumerate().flat_map(|(index, case)| {
+        advice::of(case).into_iter().map(move |text| Advice { case: Some(index), text })
+    });
+    let advice = advice.collect();
+    drop(run.work);
+    if run.reused > 0 {
+        say!("{} jobs were done before and were not run again (--fresh runs all)", run.reused);
     }
-    visibility
-}
-
-fn start_servers(loaded: &Loaded, settings: &Settings, pose: &Pose, tracer: &Tracer) -> Result<Vec<Pair>> {
-    let mut pairs = Vec::new();
-    if !settings.methods.iter().any(|m| m.uses_points()) {
-        return Ok(pairs);
-    }
-    let scene = &loaded.scene;
-    for &points_per_m2 in &settings.points_per_m2 {
-        let generate = GenerateParams {
-            points_per_m2: points_per_m2 * settings.density_factor,
-            seed: settings.seed,
-            ..GenerateParams::default()
-        };
-        let update = UpdateParams {
-            rays: settings.point_rays,
-            radius_m: settings.radius_m,
-            threshold: settings.threshold,
-            rays_still: settings.step.rays_still,
-        };
-        let config = ServerConfig { generate, update, ..ServerConfig::default() };
-        let bar = Bar::new(&format!("points, N = {points_per_m2}"), scene.instances.len() as u64);
-        let points = generate_points(scene, pose, tracer, &generate, &|done| bar.set(done as u64))?;
-        drop(bar);
-        for &hz in &settings.hz {
-            let bar =
-                Bar::new(&format!("first visibility, N = {points_per_m2}"), points.anchors.len() as u64);
-            let progress = |p: Progress| {
-                if let Progress::Tracing(done, _) = p {
-                    bar.set(done as u64);
-                }
-            };
-            let rays = points.anchors.len() as u64 * u64::from(update.rays);
-            let mut server = Server::with_points(
-                scene.clone(),
-                pose.clone(),
-                tracer.clone(),
-                points.clone(),
-                &config,
-                &progress,
-            )?;
-            let mut client = Client::new(scene.clone(), Limits::default());
-            let mut snapshot_bytes = 0;
-            if let Some(frame) = server.join()? {
-                snapshot_bytes = frame.bytes.len() as u64;
-                client.receive(&frame.bytes).context("the client refused the server's snapshot")?;
-            }
-            pairs.push(Pair {
-                points_per_m2,
-                hz,
-                server,
-                client,
-                ticks: 0,
-                delta_bytes: 0,
-                snapshot_bytes,
-                rays,
-                steps: Steps::default(),
-                server_seconds: 0.0,
-                apply_seconds: 0.0,
-            });
-        }
-    }
-    Ok(pairs)
-}
-
-/// Every method in every setting it depends on.
-fn lines(settings: &Settings, pairs: &[Pair]) -> Vec<Line> {
-    let mut lines = Vec::new();
-    for &method in &settings.methods {
-        let line = |pair: Option<usize>, file_stem| Line {
-            method,
-            pair,
-            file_stem,
-            visibility_error: PooledError::default(),
-            error: PooledError::default(),
-            reconstruct_seconds: 0.0,
-            rays: 0,
-            frames: Vec::new(),
-        };
-        if method.uses_points() {
-            for (index, pair) in pairs.iter().enumerate() {
-                lines.push(line(Some(index), format!("{method}-{}-{}hz", pair.points_per_m2, pair.hz)));
-            }
-        } else {
-            lines.push(line(None, method.to_string()));
-        }
-    }
-    lines
-}
-
-fn lines_len(settings: &Settings, pairs: &[Pair]) -> usize {
-    settings.methods.iter().map(|m| if m.uses_points() { pairs.len() } else { 1 }).sum()
-}
-
-impl Line {
-    #[allow(clippy::too_many_arguments, reason = "one call site that hands over one frame")]
-    fn compare(
-        &mut self,
-        loaded: &Loaded,
-        settings: &Settings,
-        pairs: &[Pair],
-        tracer: &Tracer,
-        drawn: &Drawn,
-        truth: &Shown,
-        (number, time_s): (usize, f64),
-        out: &Path,
-    ) -> Result<()> {
-        let start = Instant::now();
-        let visibility = match (self.method, self.pair) {
-            (Method::Psao, Some(pair)) => Some(pairs[pair].client.visibility(drawn, &Reconstruction::Atlas)),
-            (Method::PsaoMls, Some(pair)) => {
-                Some(pairs[pair].client.visibility(drawn, &Kernel::default().into()))
-            }
-            (Method::PsaoHat { radius }, Some(pair)) => {
-                let hat = Hat { radius, ..Hat::default() };
-                Some(pairs[pair].client.visibility(drawn, &Kernel::Hat(hat).into()))
-            }
-            (Method::Rtao { rays }, _) => {
-                let rays = settings.rays_per_sample(rays);
-                let covered = drawn.gbuffer.samples().iter().filter(|s| s.is_covered()).count() as u64;
-                self.rays += covered * u64::from(rays);
-                // Other directions than the truth's, or it would be compared with a part of itself.
-                Some(trace_samples(loaded, tracer, drawn, rays, settings, 1, &|_, _| ()))
-            }
-            _ => None,
-        };
-        self.reconstruct_seconds += start.elapsed().as_secs_f64();
-        let shown = Shown::new(drawn, visibility.as_deref())?;
-        let files = shown.write(out, &format!("{number:03}-{}", self.file_stem))?;
-        let compared = Compared::new(truth, &shown)?;
-        let error = compared.write_error(out, &format!("{number:03}-{}", self.file_stem))?;
-        if let Some(db) = compared.visibility_psnr_db {
-            self.visibility_error.add(db, truth.covered_pixels as f64);
-        }
-        self.error.add(compared.psnr_db, 1.0);
-        self.frames.push(FrameRow {
-            time_s,
-            visibility_psnr_db: compared.visibility_psnr_db.filter(|db| db.is_finite()),
-            psnr_db: Some(compared.psnr_db).filter(|db| db.is_finite()),
-            ssim: compared.ssim,
-            flip: compared.flip,
-            beauty: files.beauty,
-            visibility: files.visibility,
-            error,
-        });
-        Ok(())
-    }
-
-    fn finish(self, settings: &Settings, pairs: &[Pair]) -> Row {
-        let count = self.frames.len().max(1) as f64;
-        let mean = |of: fn(&FrameRow) -> f64| self.frames.iter().map(of).sum::<f64>() / count;
-        let pair = self.pair.map(|p| &pairs[p]);
-        let params = Params {
-            points_per_m2: pair.map(|p| p.points_per_m2),
-            hz: pair.map(|p| p.hz),
-            point_rays: pair.map(|_| settings.point_rays),
-            threshold: pair.map(|_| settings.threshold),
-            ray_budget: pair.and(settings.step.ray_budget),
-            rays_still: pair.map(|_| settings.step.rays_still).filter(|rays| *rays > 0),
-            rays_per_pixel: match self.method {
-                Method::Rtao { rays } => Some(rays),
-                _ => None,
-            },
-        };
-        let per_tick = |seconds: f64, p: &Pair| 1e3 * seconds / p.ticks.max(1) as f64;
-        let apply_ms = pair.map_or(0.0, |p| per_tick(p.apply_seconds, p));
-        Row {
-            method: self.method.to_string(),
-            params,
-            visibility_psnr_db: self.visibility_error.psnr_db(),
-            compared_pixels: self.visibility_error.count() as u64,
-            psnr_db: self.error.psnr_db(),
-            ssim: mean(|f| f.ssim),
-            flip: mean(|f| f.flip),
-            kbit_per_s: pair.map(|p| p.delta_bytes as f64 * 8.0 / 1000.0 / settings.seconds),
-            snapshot_bytes: pair.map(|p| p.snapshot_bytes),
-            cut_bytes: pair.map(|p| p.server.cut_bytes() as u64),
-            points: pair.map(|p| p.server.store().layout().len() as u64),
-            rays: self.rays + pair.map_or(0, |p| p.rays),
-            steps: pair.map(|p| p.steps),
-            server_ms: pair.filter(|p| p.ticks > 0).map(|p| per_tick(p.server_seconds, p)),
-            client_ms: 1e3 * self.reconstruct_seconds / count + apply_ms,
-            frames: self.frames,
-        }
-    }
-}
-
-fn results(loaded: &Loaded, settings: &Settings, rows: Vec<Row>) -> Results {
-    let scene = &loaded.scene;
-    Results {
-        schema: 1,
-        scene: SceneInfo {
-            name: loaded.title.clone(),
-            hash: scene.hash().to_string(),
-            triangles: scene.triangle_count() as u64,
-            instances: scene.instances.len() as u64,
-            warnings: scene.warnings.iter().map(|w| w.message.clone()).collect(),
-        },
+    Ok(Results {
+        schema: SCHEMA,
+        title: plan.title.clone(),
         run: RunInfo {
             dapple_version: env!("CARGO_PKG_VERSION").to_owned(),
             commit: commit(),
-            command: std::env::args().skip(1).fold("dapple".to_owned(), |line, a| line + " " + &a),
-            path: settings.path.name.clone(),
-            seconds: settings.seconds,
-            frame_times_s: settings.frame_times_s.clone(),
-            width: settings.size.width,
-            height: settings.size.height,
-            supersample: settings.supersample,
-            reference_rays: settings.reference_rays,
-            radius_m: settings.radius_m,
-            seed: settings.seed,
+            command: std::env::args().skip(1).fold("dapple".to_owned(), |line, a| line + " " + &quoted(&a)),
         },
         machine: Machine::here(),
-        rows,
+        cases,
+        advice,
+    })
+}
+
+/// An argument as a shell takes it.
+fn quoted(argument: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./,:=+@%".contains(c);
+    match !argument.is_empty() && argument.chars().all(plain) {
+        true => argument.to_owned(),
+        false => format!("'{}'", argument.replace('\'', r"'\''")),
+    }
+}
+
+impl Run<'_> {
+    /// All cases of one scene.
+    fn entry(&mut self, entry: &Entry, plan: &Plan, cases: &mut Vec<Case>) -> Result<()> {
+        self.work.message(&format!("loading {}", entry.name));
+        let loaded = source::load(&entry.scene, None)?;
+        let radius = source::radius_of(&loaded.scene, entry.settings.radius)?;
+        let mut starts = Starts::new(&loaded.scene);
+        self.judges.hdr_flip = entry.settings.hdr_flip;
+        let paths = paths(&loaded, &entry.settings.paths)?;
+        let stages: Vec<Stage<'_>> = paths
+            .into_iter()
+            .map(|path| {
+                Stage::new(&loaded, &entry.settings, path, radius, starts.tracer().clone())
+            })
+            .collect();
+        self.one_case = plan.entries.len() == 1 && stages.len() == 1;
+        // Other scenes are taken to be as much work as this one, until they are loaded.
+        let work: f64 = stages.iter().map(|stage| stage.truth_work() + job_work(stage)).sum();
+        let count: usize = stages.iter().map(|stage| 1 + jobs(stage).len()).sum();
+        let remaining = plan.entries.iter().skip_while(|e| !std::ptr::eq(*e, entry)).count() - 1;
+        self.work.expect(count, work, remaining);
+        for stage in stages {
+            let name = unique(cases, format!("{} / {}", entry.name, stage.path.name));
+            cases.push(self.case(&stage, &mut starts, name)?);
+        }
+        Ok(())
+    }
+
+    fn case(&mut self, stage: &Stage<'_>, starts: &mut Starts, name: String) -> Result<Case> {
+        let identity = self.identity(stage);
+        let slug = slug(&name);
+        let truth = self.truth(stage, &identity, &name, &slug)?;
+        let mut outcomes: Vec<(Job, Outcome)> = Vec::new();
+        for job in jobs(stage) {
+            let outcome = self.job(stage, starts, &truth, (&job, &identity), (&name, &slug))?;
+            outcomes.push((job, outcome));
+        }
+        // By method, as they were asked for, then by setting.
+        let rows = stage.settings.methods.iter().flat_map(|method| {
+            let method = method.to_string();
+            let rows = outcomes.iter().flat_map(|(_, outcome)| &outcome.rows);
+            rows.filter(move |row| row.method == method).cloned()
+        });
+        let scene = stage.scene();
+        Ok(Case {
+            name,
+            scene: SceneInfo {
+                name: stage.loaded.title.clone(),
+                hash: scene.hash().to_string(),
+                triangles: scene.triangle_count() as u64,
+                instances: scene.instances.len() as u64,
+                warnings: scene.warnings.iter().map(|w| w.message.clone()).collect(),
+            },
+            path: stage.path.name.clone(),
+            seconds: stage.seconds,
+            width: stage.settings.size.width,
+            height: stage.settings.size.height,
+            supersample: stage.settings.supersample,
+            reference_rays: stage.settings.reference_rays,
+            radius_m: stage.radius_m,
+            seed: stage.settings.seed,
+            rows: rows.collect(),
+            truth,
+        })
+    }
+
+    /// Everything that pictures and truth of a case depend on.
+    fn identity(&self, stage: &Stage<'_>) -> serde_json::Value {
+        let settings = stage.settings;
+        json!({
+            "scene": stage.scene().hash().to_string(),
+            "animation": stage.scene().active_animation,
+            "path": format!("{:?}", stage.path),
+            "seconds": stage.seconds,
+            "times": stage.frame_times_s,
+            "size": settings.size.to_string(),
+            "supersample": settings.supersample,
+            "reference_rays": settings.reference_rays,
+            "radius": [stage.radius_m, stage.density_factor],
+            "seed": settings.seed,
+        })
+    }
+
+    fn truth(&mut self, stage: &Stage<'_>, identity: &serde_json::Value, name: &str, slug: &str) -> Result<Truth> {
+        let key = self.journal.key(json!({ "truth": identity }));
+        let what = format!("{name}: truth");
+        let work = stage.truth_work();
+        let files = |truth: &Truth| {
+            truth.frames.iter().flat_map(|f| [f.beauty.clone(), f.visibility.clone()]).collect::<Vec<_>>()
+        };
+        if let Some(truth) = self.journal.get(&key, files) {
+            self.reused += 1;
+            self.work.finish(&what, work, false);
+            return Ok(truth);
+        }
+        self.work.begin(&what);
+        let count = stage.frame_times_s.len();
+        let mut frames = Vec::with_capacity(count);
+        for (number, &time_s) in stage.frame_times_s.iter().enumerate() {
+            let bar = &self.work;
+            let part = |part: f64| bar.part(work, (number as f64 + part) / count as f64);
+            let frame = stage.frame(number, &self.cache, &part)?;
+            let stem = format!("pictures/{slug}/truth.{}/{number:03}", key.short());
+            let pictures = frame.truth.write(self.out, &stem)?;
+            frames.push(TruthFrame {
+                time_s,
+                covered_pixels: frame.truth.covered_pixels as u64,
+                noise_rms: frame.noise_mse.sqrt(),
+                beauty: pictures.beauty,
+                visibility: pictures.visibility,
+            });
+        }
+        let noise: Vec<FrameError> = frames
+            .iter()
+            .map(|f| FrameError { mse: f.noise_rms * f.noise_rms, weight: f.covered_pixels as f64 })
+            .collect();
+        let noise_rms = super::figures::pooled_mse(&noise, None).unwrap_or(0.0).sqrt();
+        let truth = Truth { noise_rms, frames };
+        self.journal.put(&key, &truth)?;
+        self.work.finish(&what, work, true);
+        Ok(truth)
+    }
+
+    fn job(
+        &mut self,
+        stage: &Stage<'_>,
+        starts: &mut Starts,
+        truth: &Truth,
+        (job, identity): (&Job, &serde_json::Value),
+        (name, slug): (&str, &str),
+    ) -> Result<Outcome> {
+        let settings = stage.settings;
+        let key = self.journal.key(json!({
+            "case": identity,
+            "job": format!("{job:?}"),
+            "points": [settings.point_rays, u32::from(settings.threshold), settings.step.rays_still],
+            "ray_budget": settings.step.ray_budget,
+            "hdr_flip": settings.hdr_flip,
+            "lpips": self.weights_hash,
+        }));
+        let what = format!("{name}: {}", job.name());
+        let work = job.work(stage);
+        let record = match job {
+            Job::Points { .. } => self.record.map(|file| self.recording_file(file, stage, job, slug)),
+            Job::Alone(_) => None,
+        };
+        let recorded = record.as_ref().is_none_or(|file| file.is_file());
+        if recorded && let Some(outcome) = self.journal.get(&key, Outcome::files) {
+            self.reused += 1;
+            self.work.finish(&what, work, false);
+            return Ok(outcome);
+        }
+        self.work.begin(&what);
+        let desk = Desk {
+            out: self.out,
+            folder: format!("pictures/{slug}/{}.{}", job.name(), key.short()),
+            judges: &self.judges,
+            cache: &self.cache,
+            truth,
+            record: record.as_ref().map(|_| name),
+        };
+        let bar = &self.work;
+        let (outcome, recording) = job.run(stage, starts, &desk, &|part| bar.part(work, part))?;
+        if let (Some(file), Some(bytes)) = (record, recording) {
+            write_file(&file, &bytes)?;
+        }
+        self.journal.put(&key, &outcome)?;
+        self.work.finish(&what, work, true);
+        Ok(outcome)
+    }
+
+    /// `file` itself where only one setting records, otherwise with the setting in its name.
+    fn recording_file(&self, file: &Path, stage: &Stage<'_>, job: &Job, slug: &str) -> PathBuf {
+        let with_points = jobs(stage).iter().filter(|j| matches!(j, Job::Points { .. })).count();
+        if self.one_case && with_points == 1 {
+            return file.to_owned();
+        }
+        let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+        file.with_file_name(format!("{stem}-{slug}-{}.dapple", job.name()))
+    }
+}
+
+/// The paths that are asked for: by name, from files, all that move, or the scene's first.
+fn paths(loaded: &Loaded, wanted: &[String]) -> Result<Vec<CameraPath>> {
+    if wanted.is_empty() {
+        return Ok(vec![source::find_path(&loaded.scene, None)?]);
+    }
+    let mut found: Vec<CameraPath> = Vec::new();
+    for name in wanted {
+        if name == "all" {
+            let all = loaded.scene.camera_paths();
+            let moving: Vec<CameraPath> =
+                all.iter().filter(|p| matches!(p.source, CameraSource::Animated { .. })).cloned().collect();
+            found.extend(if moving.is_empty() { all.into_iter().rev().take(1).collect() } else { moving });
+        } else {
+            found.push(source::find_path(&loaded.scene, Some(name))?);
+        }
+    }
+    Ok(found)
+}
+
+fn job_work(stage: &Stage<'_>) -> f64 {
+    jobs(stage).iter().map(|job| job.work(stage)).sum()
+}
+
+/// A name that no case has yet.
+fn unique(cases: &[Case], name: String) -> String {
+    let taken = |name: &str| cases.iter().any(|case| case.name == name);
+    let numbered = (2..).map(|n| format!("{name} ({n})"));
+    std::iter::once(name.clone()).chain(numbered).find(|name| !taken(name)).unwrap_or(name)
+}
+
+/// A name that every file system takes.
+fn slug(name: &str) -> String {
+    let mut slug = String::new();
+    for c in name.chars() {
+        match c {
+            c if c.is_ascii_alphanumeric() || c == '.' || c == '_' => slug.push(c),
+            _ if slug.ends_with('-') || slug.is_empty() => {}
+            _ => slug.push('-'),
+        }
+    }
+    let slug = slug.trim_matches(['-', '.']);
+    let short: String = slug.chars().take(80).collect();
+    if short.is_empty() { "case".to_owned() } else { short }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_become_file_names() {
+        assert_eq!(slug("atrium / path-walk"), "atrium-path-walk");
+        assert_eq!(slug("../..//x (2)"), "x-2");
+        assert_eq!(slug("房"), "case");
+    }
+
+    #[test]
+    fn commands_can_be_pasted() {
+        assert_eq!(quoted("--size"), "--size");
+        assert_eq!(quoted("my room.glb"), "'my room.glb'");
+        assert_eq!(quoted("it's"), r"'it'\''s'");
     }
 }

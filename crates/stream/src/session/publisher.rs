@@ -45,7 +45,7 @@ pub enum PublishError {
 ///
 /// It keeps one byte a point (what subscribers hold) and the encoded layout, and never an older state: a
 /// subscriber that fell behind or joins takes a snapshot of the present one, made at most once an epoch.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Publisher {
     scene_hash: [u8; 32],
     config: PublisherConfig,
@@ -56,7 +56,7 @@ pub struct Publisher {
 }
 
 /// What subscribers that are up to date hold.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct State {
     layout: Arc<PointLayout>,
     layout_bytes: Vec<u8>,

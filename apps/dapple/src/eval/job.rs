@@ -1,0 +1,348 @@
+//! One setting of one case, from its start to its rows: the unit that a stopped run continues with.
+
+use std::time::Instant;
+
+use anyhow::Result;
+use dapple_client::{Drawn, Reconstruction};
+use dapple_metrics::Flicker;
+use dapple_render::psao::{Hat, Kernel};
+use dapple_trace::rtao::{RtaoParams, trace_visibility};
+use serde::{Deserialize, Serialize};
+
+use super::figures::{FrameError, jackknife, mean, mean_of_all, pooled_psnr, root_mean_square};
+use super::pair::{Pair, Start, Starts};
+use super::results::{Figure, FrameRow, Params, Row, Settling, Times, Truth};
+use super::settle::settle;
+use super::stage::{Frame, Stage};
+use super::truth::Cache;
+use crate::args::Method;
+use crate::picture::{Compared, Judges, Shown, sites};
+
+/// What is run together.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Job {
+    /// One server, looked up in several ways.
+    Points { points_per_m2: f32, hz: f64, methods: Vec<Method> },
+    /// A method without a server.
+    Alone(Method),
+}
+
+/// What a job gave.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Outcome {
+    pub(super) rows: Vec<Row>,
+}
+
+impl Outcome {
+    /// Every file that the rows name.
+    pub(super) fn files(&self) -> Vec<String> {
+        let frames = self.rows.iter().flat_map(|row| &row.frames);
+        frames.flat_map(|f| [&f.beauty, &f.visibility, &f.error, &f.flip_map]).cloned().collect()
+    }
+}
+
+/// Where a job's pictures go, and how they are judged.
+pub(super) struct Desk<'a> {
+    pub(super) out: &'a std::path::Path,
+    /// Relative to `out`.
+    pub(super) folder: String,
+    pub(super) judges: &'a Judges,
+    pub(super) cache: &'a Cache,
+    pub(super) truth: &'a Truth,
+    /// Name of the recording to make.
+    pub(super) record: Option<&'a str>,
+}
+
+/// All jobs of a case, those with points first, as the methods ask for them.
+pub(super) fn jobs(stage: &Stage<'_>) -> Vec<Job> {
+    let settings = stage.settings;
+    let (with_points, alone): (Vec<Method>, Vec<Method>) =
+        settings.methods.iter().partition(|m| m.uses_points());
+    let mut jobs = Vec::new();
+    if !with_points.is_empty() {
+        for &points_per_m2 in &settings.points_per_m2 {
+            for &hz in &settings.hz {
+                jobs.push(Job::Points { points_per_m2, hz, methods: with_points.clone() });
+            }
+        }
+    }
+    jobs.extend(alone.into_iter().map(Job::Alone));
+    jobs
+}
+
+impl Job {
+    /// A few words, also for file names.
+    pub(super) fn name(&self) -> String {
+        match self {
+            Job::Points { points_per_m2, hz, .. } => format!("points-{points_per_m2}-{hz}hz"),
+            Job::Alone(method) => method.to_string(),
+        }
+    }
+
+    fn methods(&self) -> Vec<Method> {
+        match self {
+            Job::Points { methods, .. } => methods.clone(),
+            Job::Alone(method) => vec![*method],
+        }
+    }
+
+    /// About how much work it is, in rays: tracing and metrics.
+    pub(super) fn work(&self, stage: &Stage<'_>) -> f64 {
+        let pictures = stage.frame_times_s.len() as f64 * stage.samples() as f64;
+        match self {
+            // Laying and first rays go by the surface, which is not known; a picture's worth of points is a fair guess.
+            Job::Points { methods, points_per_m2, .. } => {
+                pictures * 40.0 * methods.len() as f64 + 4e4 * f64::from(*points_per_m2)
+            }
+            Job::Alone(Method::Rtao { rays }) => {
+                pictures * (40.0 + 2.0 * f64::from(stage.settings.rays_per_sample(*rays)))
+            }
+            Job::Alone(_) => pictures * 40.0,
+        }
+    }
+
+    /// Runs it. `progress` gets the part that is done; the recording is returned with the rows.
+    pub(super) fn run(
+        &self,
+        stage: &Stage<'_>,
+        starts: &mut Starts,
+        desk: &Desk<'_>,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<(Outcome, Option<Vec<u8>>)> {
+        let mut pair = match self {
+            Job::Points { points_per_m2, hz, .. } => {
+                let start = Start::new(stage, *points_per_m2);
+                let server = starts.server(stage.loaded, &start, &|part| progress(0.3 * part))?;
+                let pair = Pair::new(server, (*points_per_m2, *hz), stage, desk.record)?;
+                if self.methods().contains(&Method::Psao) {
+                    // Made once a session, so not what a picture costs.
+                    pair.client.atlas();
+                }
+                Some(pair)
+            }
+            Job::Alone(_) => None,
+        };
+        let began = if pair.is_some() { 0.3 } else { 0.0 };
+        let mut lines: Vec<Line> = self.methods().into_iter().map(Line::new).collect();
+        let count = stage.frame_times_s.len();
+        for number in 0..count {
+            let frame = stage.frame(number, desk.cache, &|_| ())?;
+            if let Some(pair) = &mut pair {
+                pair.advance(frame.time_s, stage)?;
+            }
+            for line in &mut lines {
+                line.compare(stage, pair.as_ref(), &frame, number, desk)?;
+            }
+            if let Some(pair) = &mut pair {
+                pair.advance(frame.next.time_s, stage)?;
+            }
+            for line in &mut lines {
+                line.see_flicker(stage, pair.as_ref(), &frame)?;
+            }
+            progress(began + (1.0 - began) * (number + 1) as f64 / count as f64);
+        }
+        let mut settlings: Vec<Option<Settling>> = vec![None; lines.len()];
+        let mut recording = None;
+        if let Some(pair) = &mut pair {
+            pair.advance(stage.seconds, stage)?;
+            recording = pair.take_recording();
+            let looks: Vec<Reconstruction> = lines.iter().filter_map(|l| reconstruction(l.method)).collect();
+            settlings = settle(stage, pair, &looks, desk.cache)?.into_iter().map(Some).collect();
+        }
+        let rows = lines.into_iter().zip(settlings);
+        let rows = rows.map(|(line, settling)| line.finish(stage, pair.as_ref(), settling, desk.truth)).collect();
+        Ok((Outcome { rows }, recording))
+    }
+}
+
+fn reconstruction(method: Method) -> Option<Reconstruction> {
+    match method {
+        Method::Psao => Some(Reconstruction::Atlas),
+        Method::PsaoMls => Some(Kernel::default().into()),
+        Method::PsaoHat { radius } => Some(Kernel::Hat(Hat { radius, ..Hat::default() }).into()),
+        Method::Rtao { .. } | Method::None => None,
+    }
+}
+
+/// One row while it grows.
+struct Line {
+    method: Method,
+    reconstruct_seconds: f64,
+    looks: u32,
+    rays: u64,
+    /// Visibility of the latest picture's pixels.
+    visibility: Vec<f32>,
+    frames: Vec<FrameRow>,
+}
+
+impl Line {
+    fn new(method: Method) -> Line {
+        Line { method, reconstruct_seconds: 0.0, looks: 0, rays: 0, visibility: Vec::new(), frames: Vec::new() }
+    }
+
+    /// One visibility a sample; all open for `None`.
+    fn look(&mut self, stage: &Stage<'_>, pair: Option<&Pair>, drawn: &Drawn) -> Option<Vec<f32>> {
+        let start = Instant::now();
+        let visibility = match (self.method, pair, reconstruction(self.method)) {
+            (_, Some(pair), Some(reconstruction)) => Some(pair.client.visibility(drawn, &reconstruction)),
+            (Method::Rtao { rays }, _, _) => {
+                let rays = stage.settings.rays_per_sample(rays);
+                let (indices, sites) = sites(stage.scene(), drawn);
+                self.rays += sites.len() as u64 * u64::from(rays);
+                // Other directions than the truth's, or it would be compared with a part of itself.
+                let seed = u64::from(stage.settings.seed) << 8 | 1;
+                let params = RtaoParams { rays, radius_m: stage.radius_m, seed };
+                let mut traced = vec![1.0; sites.len()];
+                trace_visibility(&stage.tracer_at(drawn), &sites, &params, &mut traced);
+                let mut visibility = vec![1.0; drawn.gbuffer.samples().len()];
+                for (index, value) in indices.into_iter().zip(traced) {
+                    visibility[index] = value;
+                }
+                Some(visibility)
+            }
+            _ => None,
+        };
+        self.reconstruct_seconds += start.elapsed().as_secs_f64();
+        self.looks += 1;
+        visibility
+    }
+
+    fn compare(
+        &mut self,
+        stage: &Stage<'_>,
+        pair: Option<&Pair>,
+        frame: &Frame,
+        number: usize,
+        desk: &Desk<'_>,
+    ) -> Result<()> {
+        let visibility = self.look(stage, pair, &frame.drawn);
+        let shown = Shown::new(&frame.drawn, visibility.as_deref())?;
+        let compared = Compared::new(&frame.truth, &shown, desk.judges)?;
+        let stem = format!("{}/{number:03}-{}", desk.folder, self.method);
+        let files = shown.write(desk.out, &stem)?;
+        let maps = compared.write(desk.out, &stem)?;
+        self.frames.push(FrameRow {
+            time_s: frame.time_s,
+            visibility_psnr_db: compared.visibility_psnr_db.filter(|db| db.is_finite()),
+            psnr_db: Some(compared.psnr_db).filter(|db| db.is_finite()),
+            ssim: compared.ssim,
+            flip: compared.flip,
+            hdr_flip: compared.hdr_flip,
+            lpips: compared.lpips,
+            flicker: None,
+            beauty: files.beauty,
+            visibility: files.visibility,
+            error: maps.error,
+            flip_map: maps.flip,
+        });
+        self.visibility = shown.into_visibility();
+        Ok(())
+    }
+
+    /// Compares what still places show now with what they showed a frame before.
+    fn see_flicker(&mut self, stage: &Stage<'_>, pair: Option<&Pair>, frame: &Frame) -> Result<()> {
+        let drawn = &frame.next.drawn;
+        let now = match self.look(stage, pair, drawn) {
+            Some(samples) => dapple_render::compose::resolve_plane(&drawn.gbuffer, &samples, 1.0)?.values.values,
+            None => vec![1.0; self.visibility.len()],
+        };
+        let (width, height) = (drawn.gbuffer.width, drawn.gbuffer.height);
+        let mut flicker = Flicker::default();
+        flicker.add(width, height, &self.visibility, &now, &frame.next.still)?;
+        if let Some(last) = self.frames.last_mut() {
+            last.flicker = flicker.rms().map(|rms| 255.0 * rms);
+        }
+        Ok(())
+    }
+
+    fn finish(self, stage: &Stage<'_>, pair: Option<&Pair>, settling: Option<Settling>, truth: &Truth) -> Row {
+        let settings = stage.settings;
+        let covered: Vec<f64> = truth.frames.iter().map(|f| f.covered_pixels as f64).collect();
+        let of = |value: fn(&FrameRow) -> f64| mean(&self.frames.iter().map(value).collect::<Vec<f64>>());
+        let optional = |value: fn(&FrameRow) -> Option<f64>| self.frames.iter().map(value).collect::<Vec<_>>();
+        let visibility: Vec<FrameError> = self
+            .frames
+            .iter()
+            .zip(&covered)
+            .map(|(f, &weight)| FrameError::new(f.visibility_psnr_db, weight))
+            .collect();
+        let picture: Vec<FrameError> = self.frames.iter().map(|f| FrameError::new(f.psnr_db, 1.0)).collect();
+        let params = Params {
+            points_per_m2: pair.map(|p| p.points_per_m2),
+            hz: pair.map(|p| p.hz),
+            point_rays: pair.map(|_| settings.point_rays),
+            threshold: pair.map(|_| settings.threshold),
+            ray_budget: pair.and(settings.step.ray_budget),
+            rays_still: pair.map(|_| settings.step.rays_still).filter(|rays| *rays > 0),
+            rays_per_pixel: match self.method {
+                Method::Rtao { rays } => Some(rays),
+                _ => None,
+            },
+        };
+        let per_step = |seconds: f64, p: &Pair| 1e3 * seconds / p.step_bytes.len().max(1) as f64;
+        let apply_ms = pair.map_or(0.0, |p| per_step(p.apply_seconds, p));
+        Row {
+            method: self.method.to_string(),
+            params,
+            compared_pixels: covered.iter().sum::<f64>() as u64,
+            visibility_psnr_db: pooled_psnr(&visibility),
+            psnr_db: pooled_psnr(&picture),
+            ssim: of(|f| f.ssim),
+            flip: of(|f| f.flip),
+            hdr_flip: mean_of_all(&optional(|f| f.hdr_flip)),
+            lpips: mean_of_all(&optional(|f| f.lpips)),
+            flicker: root_mean_square(&optional(|f| f.flicker)),
+            kbit_per_s: pair.map(|p| kbit_per_s(&p.step_bytes, p.hz, stage.seconds)),
+            snapshot_bytes: pair.map(|p| p.snapshot_bytes),
+            cut_bytes: pair.map(Pair::cut_bytes),
+            points: pair.map(Pair::points),
+            rays: self.rays + pair.map_or(0, |p| p.rays),
+            steps: pair.map(|p| p.steps),
+            step_bytes: pair.map(|p| p.step_bytes.clone()).unwrap_or_default(),
+            settling,
+            frames: self.frames,
+            times: Times {
+                server_ms: pair.filter(|p| !p.step_bytes.is_empty()).map(|p| per_step(p.server_seconds, p)),
+                client_ms: 1e3 * self.reconstruct_seconds / f64::from(self.looks.max(1)) + apply_ms,
+            },
+        }
+    }
+}
+
+/// Bits of all updates by the length of the path; the interval is that of its seconds.
+fn kbit_per_s(step_bytes: &[u32], hz: f64, seconds: f64) -> Figure {
+    let kbit = |bytes: f64, seconds: f64| bytes * 8e-3 / seconds;
+    let total: f64 = step_bytes.iter().map(|b| f64::from(*b)).sum();
+    // Whole seconds of the path, each one observation.
+    let mut buckets = vec![0.0; seconds.floor() as usize];
+    for (step, bytes) in step_bytes.iter().enumerate() {
+        // A step at the very end of a second closes it.
+        let second = (((step + 1) as f64 / hz - 1e-9).max(0.0)) as usize;
+        if let Some(bucket) = buckets.get_mut(second) {
+            *bucket += f64::from(*bytes);
+        }
+    }
+    let spread = jackknife(buckets.len(), |left_out| {
+        let kept = buckets.iter().enumerate().filter(|(i, _)| Some(*i) != left_out).map(|(_, b)| *b);
+        let (sum, count) = kept.fold((0.0, 0.0), |(s, c), b| (s + b, c + 1.0));
+        (count > 0.0).then(|| kbit(sum, count))
+    });
+    Figure { value: Some(kbit(total, seconds)), ci95: spread.ci95 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bits_are_counted_over_the_whole_path() {
+        // Three seconds and a half at 2 Hz.
+        let steps = [100, 0, 300, 0, 200, 0, 50];
+        let figure = kbit_per_s(&steps, 2.0, 3.5);
+        assert!((figure.value.unwrap() - 650.0 * 8e-3 / 3.5).abs() < 1e-12);
+        // Seconds of 100, 300, 200 bytes: the usual interval of a mean of three.
+        let expected = 4.303 * (100.0 * 100.0 / 3.0f64).sqrt() * 8e-3;
+        assert!((figure.ci95.unwrap() - expected).abs() < 1e-9, "{figure:?}");
+        assert_eq!(kbit_per_s(&[100], 15.0, 0.5).ci95, None);
+    }
+}

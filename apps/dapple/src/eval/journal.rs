@@ -1,0 +1,128 @@
+//! What a run has finished, kept so that the same command continues where it was stopped.
+//!
+//! Each finished job is one file, named by a hash of everything that its outcome depends on, the program included. So
+//! nothing is taken for done that another program, scene or setting would have done differently.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use crate::picture::write_file;
+use crate::source::read_limited;
+
+/// The largest file that is read back.
+const MAX_BYTES: u64 = 1 << 30;
+
+pub(super) struct Journal {
+    /// Where results lie; pictures are named relative to it.
+    out: PathBuf,
+    /// Hash of the program.
+    program: String,
+}
+
+/// What one file holds.
+#[derive(Serialize, Deserialize)]
+struct Entry<T> {
+    /// In full, against two of the same hash.
+    key: serde_json::Value,
+    value: T,
+}
+
+/// Names a job.
+#[derive(Debug, Clone)]
+pub(super) struct Key {
+    text: serde_json::Value,
+    /// Hexadecimal, 16 digits.
+    hash: String,
+}
+
+impl Key {
+    /// Short, for the names of files that belong to the job.
+    pub(super) fn short(&self) -> &str {
+        &self.hash[..8]
+    }
+}
+
+impl Journal {
+    /// The journal of results in `out`; `fresh` forgets what was done before.
+    pub(super) fn open(out: &Path, fresh: bool) -> Result<Journal> {
+        let folder = out.join("jobs");
+        if fresh && folder.exists() {
+            std::fs::remove_dir_all(&folder)
+                .with_context(|| format!("cannot remove {}", folder.display()))?;
+        }
+        let program = std::env::current_exe().context("cannot find the program's own file")?;
+        let bytes = std::fs::read(&program)
+            .with_context(|| format!("cannot read the program's own file {}", program.display()))?;
+        Ok(Journal { out: out.to_owned(), program: hex(&blake3::hash(&bytes)) })
+    }
+
+    /// The name of a job, from everything that its outcome depends on.
+    pub(super) fn key(&self, what: serde_json::Value) -> Key {
+        let text = serde_json::json!({ "program": self.program, "job": what });
+        let hash = hex(&blake3::hash(text.to_string().as_bytes()));
+        Key { text, hash }
+    }
+
+    /// What the job gave, if it was finished and the files that it names are still there.
+    pub(super) fn get<T: DeserializeOwned>(
+        &self,
+        key: &Key,
+        files: impl Fn(&T) -> Vec<String>,
+    ) -> Option<T> {
+        let bytes = read_limited(&self.file(key), MAX_BYTES).ok()?;
+        // What cannot be read was not finished.
+        let entry: Entry<T> = serde_json::from_slice(&bytes).ok()?;
+        let whole = entry.key == key.text
+            && files(&entry.value).iter().all(|file| self.out.join(file).is_file());
+        whole.then_some(entry.value)
+    }
+
+    /// Keeps what a job gave.
+    pub(super) fn put<T: Serialize>(&self, key: &Key, value: &T) -> Result<()> {
+        let entry = Entry { key: key.text.clone(), value };
+        write_file(&self.file(key), &serde_json::to_vec(&entry)?)
+    }
+
+    fn file(&self, key: &Key) -> PathBuf {
+        self.out.join("jobs").join(format!("{}.json", key.hash))
+    }
+}
+
+/// The first 16 hexadecimal digits.
+fn hex(hash: &blake3::Hash) -> String {
+    hash.to_hex()[..16].to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn only_whole_jobs_of_the_same_name_count() {
+        let folder = tempfile::tempdir().unwrap();
+        let journal = Journal::open(folder.path(), false).unwrap();
+        let key = journal.key(json!({ "scene": 1 }));
+        let none = |_: &Vec<f64>| Vec::new();
+        assert_eq!(journal.get(&key, none), None);
+        let value = vec![0.1 + 0.2, f64::MIN_POSITIVE, 1e300 / 3.0];
+        journal.put(&key, &value).unwrap();
+        assert_eq!(journal.get(&key, none), Some(value.clone()), "to the last bit");
+        assert_eq!(journal.get(&journal.key(json!({ "scene": 2 })), none), None);
+        // A picture that it names is gone.
+        let picture = |_: &Vec<f64>| vec!["picture.png".to_owned()];
+        assert_eq!(journal.get(&key, picture), None);
+        std::fs::write(folder.path().join("picture.png"), "").unwrap();
+        assert_eq!(journal.get(&key, picture), Some(value));
+        // Half a file.
+        let file = journal.file(&key);
+        let bytes = std::fs::read(&file).unwrap();
+        std::fs::write(&file, &bytes[..bytes.len() / 2]).unwrap();
+        assert_eq!(journal.get(&key, none), None);
+        let again = Journal::open(folder.path(), true).unwrap();
+        assert!(!again.file(&key).exists());
+    }
+}

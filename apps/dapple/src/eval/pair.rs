@@ -1,0 +1,245 @@
+//! A server at one density and rate, and the client that follows it.
+
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+use dapple_client::Client;
+use dapple_scene::{CameraPath, Pose, Scene};
+use dapple_server::{Progress, Server, ServerConfig};
+use dapple_stream::{Limits, Recorder, RecordingHeader};
+use dapple_trace::Tracer;
+use dapple_trace::psao::generate::{GenerateParams, generate_points};
+use dapple_trace::psao::update::{ConvexVolume, StepInput, UpdateParams};
+
+use super::results::Steps;
+use super::stage::Stage;
+use crate::light::microseconds;
+use crate::source::Loaded;
+
+/// Servers at their start are kept for other rates and paths while they have no more points than this together.
+const MAX_KEPT_POINTS: usize = 6_000_000;
+
+/// What a server at its start depends on, beside the scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Start {
+    pub(super) points_per_m2: f32,
+    pub(super) update: UpdateParams,
+    pub(super) seed: u32,
+}
+
+impl Start {
+    pub(super) fn new(stage: &Stage<'_>, points_per_m2: f32) -> Start {
+        let settings = stage.settings;
+        Start {
+            points_per_m2: points_per_m2 * stage.density_factor,
+            update: UpdateParams {
+                rays: settings.point_rays,
+                radius_m: stage.radius_m,
+                threshold: settings.threshold,
+                rays_still: settings.step.rays_still,
+            },
+            seed: settings.seed,
+        }
+    }
+}
+
+/// Servers of one scene at time 0, which are the same for every rate and path.
+pub(super) struct Starts {
+    rest_pose: Pose,
+    tracer: Tracer,
+    kept: Vec<(Start, Server)>,
+}
+
+impl Starts {
+    pub(super) fn new(scene: &Scene) -> Starts {
+        let rest_pose = scene.pose(0.0);
+        let tracer = Tracer::new(scene, &rest_pose);
+        Starts { rest_pose, tracer, kept: Vec::new() }
+    }
+
+    /// The scene's tracer, at rest.
+    pub(super) fn tracer(&self) -> &Tracer {
+        &self.tracer
+    }
+
+    /// A server at its start; `progress` gets the part that is done.
+    pub(super) fn server(
+        &mut self,
+        loaded: &Loaded,
+        start: &Start,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<Server> {
+        if let Some((_, server)) = self.kept.iter().find(|(kept, _)| kept == start) {
+            return Ok(server.clone());
+        }
+        let scene = &loaded.scene;
+        let generate = GenerateParams {
+            points_per_m2: start.points_per_m2,
+            seed: start.seed,
+            ..GenerateParams::default()
+        };
+        let config = ServerConfig { generate, update: start.update, ..ServerConfig::default() };
+        let part = |done: usize, of: usize| done as f64 / of.max(1) as f64;
+        let instances = scene.instances.len();
+        let laid = |done| progress(0.3 * part(done, instances));
+        let points = generate_points(scene, &self.rest_pose, &self.tracer, &generate, &laid)?;
+        let server = Server::with_points(
+            scene.clone(),
+            self.rest_pose.clone(),
+            self.tracer.clone(),
+            points,
+            &config,
+            &|p| match p {
+                Progress::Laying(done, of) => progress(0.3 * part(done, of)),
+                Progress::Tracing(done, of) => progress(0.3 + 0.5 * part(done, of)),
+                Progress::Cutting(done, of) => progress(0.8 + 0.2 * part(done, of)),
+            },
+        )?;
+        let points = |server: &Server| server.store().layout().len();
+        while !self.kept.is_empty()
+            && self.kept.iter().map(|(_, s)| points(s)).sum::<usize>() + points(&server) > MAX_KEPT_POINTS
+        {
+            self.kept.remove(0);
+        }
+        if points(&server) <= MAX_KEPT_POINTS {
+            self.kept.push((*start, server.clone()));
+        }
+        Ok(server)
+    }
+}
+
+/// A server, its client, and what was counted between them.
+pub(super) struct Pair {
+    pub(super) client: Client,
+    pub(super) points_per_m2: f32,
+    pub(super) hz: f64,
+    pub(super) snapshot_bytes: u64,
+    /// Bytes of each step's update.
+    pub(super) step_bytes: Vec<u32>,
+    pub(super) rays: u64,
+    pub(super) steps: Steps,
+    pub(super) server_seconds: f64,
+    pub(super) apply_seconds: f64,
+    server: Server,
+    ray_budget: Option<u64>,
+    recording: Option<Recording>,
+}
+
+/// What is kept of the stream.
+struct Recording {
+    recorder: Recorder,
+    bytes: Vec<u8>,
+    duration_us: u64,
+}
+
+impl Pair {
+    /// A client joins the server at its start. `record` is the name of a recording to make.
+    pub(super) fn new(
+        mut server: Server,
+        (points_per_m2, hz): (f32, f64),
+        stage: &Stage<'_>,
+        record: Option<&str>,
+    ) -> Result<Pair> {
+        let mut client = Client::new(server.scene().clone(), Limits::default());
+        let Some(snapshot) = server.join()? else { bail!("the server has published nothing") };
+        client.receive(&snapshot.bytes).context("the client refused the server's snapshot")?;
+        let mut recording = None;
+        if let Some(name) = record {
+            let duration_us = microseconds(stage.seconds);
+            let scene_hash = server.scene().hash().0;
+            let header = RecordingHeader { scene_hash, name: name.to_owned(), duration_us };
+            let (mut recorder, mut bytes) = Recorder::new(&header).context("--record")?;
+            bytes.extend(recorder.frame(0, &snapshot.bytes)?);
+            recording = Some(Recording { recorder, bytes, duration_us });
+        }
+        let rays = server.store().layout().len() as u64 * u64::from(stage.settings.point_rays);
+        Ok(Pair {
+            client,
+            points_per_m2,
+            hz,
+            snapshot_bytes: snapshot.bytes.len() as u64,
+            step_bytes: Vec::new(),
+            rays,
+            steps: Steps::default(),
+            server_seconds: 0.0,
+            apply_seconds: 0.0,
+            server,
+            ray_budget: stage.settings.step.ray_budget,
+            recording,
+        })
+    }
+
+    /// Steps up to and including `until_s`; the client takes every frame.
+    pub(super) fn advance(&mut self, until_s: f64, stage: &Stage<'_>) -> Result<()> {
+        loop {
+            let tick_s = (self.step_bytes.len() + 1) as f64 / self.hz;
+            // The sum of many ticks must not lose the last one to rounding.
+            if tick_s > until_s + 1e-9 {
+                return Ok(());
+            }
+            let start = Instant::now();
+            let interest = interest(tick_s, self.hz, self.ray_budget, stage);
+            let input = StepInput { ray_budget: self.ray_budget, interest: &interest };
+            let report = self.server.step_with(tick_s, &input)?;
+            self.server_seconds += start.elapsed().as_secs_f64();
+            self.rays += report.rays;
+            self.steps.add(&report.counts);
+            let start = Instant::now();
+            let mut bytes = 0;
+            if let Some(frame) = &report.frame {
+                bytes = frame.bytes.len() as u32;
+                self.client.receive(&frame.bytes).context("the client refused the server's frame")?;
+            }
+            self.apply_seconds += start.elapsed().as_secs_f64();
+            if let (Some(recording), Some(frame)) = (&mut self.recording, &report.frame) {
+                let time_us = microseconds(tick_s).min(recording.duration_us);
+                recording.bytes.extend(recording.recorder.frame(time_us, &frame.bytes)?);
+            }
+            self.step_bytes.push(bytes);
+        }
+    }
+
+    /// Steps once with the scene at `time_s`, uncounted; whether the client's light changed.
+    pub(super) fn step_at(&mut self, time_s: f64, stage: &Stage<'_>) -> Result<bool> {
+        let interest = interest(time_s, self.hz, self.ray_budget, stage);
+        let input = StepInput { ray_budget: self.ray_budget, interest: &interest };
+        match self.server.step_with(time_s, &input)?.frame {
+            None => Ok(false),
+            Some(frame) => {
+                self.client.receive(&frame.bytes).context("the client refused the server's frame")?;
+                Ok(true)
+            }
+        }
+    }
+
+    pub(super) fn points(&self) -> u64 {
+        self.server.store().layout().len() as u64
+    }
+
+    pub(super) fn cut_bytes(&self) -> u64 {
+        self.server.cut_bytes() as u64
+    }
+
+    /// The whole recording, if one was made.
+    pub(super) fn take_recording(&mut self) -> Option<Vec<u8>> {
+        let Recording { recorder, mut bytes, .. } = self.recording.take()?;
+        bytes.extend(recorder.finish());
+        Some(bytes)
+    }
+}
+
+/// What the viewer sees by the next tick, where a budget asks for it.
+fn interest(tick_s: f64, hz: f64, ray_budget: Option<u64>, stage: &Stage<'_>) -> Vec<ConvexVolume> {
+    if ray_budget.is_none() {
+        return Vec::new();
+    }
+    let scene = stage.scene();
+    let path: &CameraPath = &stage.path;
+    let size = stage.settings.size;
+    let aspect = size.width as f32 / size.height as f32;
+    let frustum = |time_s: f64| {
+        let camera = path.camera(scene, &scene.pose_undeformed(time_s));
+        ConvexVolume::frustum(&camera, aspect, f32::INFINITY, stage.radius_m)
+    };
+    vec![frustum(tick_s), frustum(tick_s + 1.0 / hz)]
+}

@@ -1,0 +1,112 @@
+//! The settings of one scene, with every default filled in.
+
+use anyhow::{Result, bail};
+
+use crate::args::{Method, Options, Radius, Size, StepArgs};
+
+/// Frame times lie on a grid of this rate, whatever the server's rate.
+pub(in crate::eval) const CLIENT_HZ: f64 = 60.0;
+
+/// Smallest picture side that every metric accepts.
+const MIN_SIDE: u32 = 16;
+
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::eval) struct Settings {
+    pub(in crate::eval) methods: Vec<Method>,
+    /// Names of camera paths; empty for the scene's first.
+    pub(in crate::eval) paths: Vec<String>,
+    /// As much of a path as is played; all of it without.
+    pub(in crate::eval) seconds: Option<f64>,
+    pub(in crate::eval) frames: u32,
+    pub(in crate::eval) size: Size,
+    pub(in crate::eval) supersample: u32,
+    pub(in crate::eval) points_per_m2: Vec<f32>,
+    pub(in crate::eval) hz: Vec<f64>,
+    pub(in crate::eval) reference_rays: u32,
+    pub(in crate::eval) radius: Radius,
+    pub(in crate::eval) point_rays: u32,
+    pub(in crate::eval) threshold: u8,
+    pub(in crate::eval) seed: u32,
+    pub(in crate::eval) step: StepArgs,
+    pub(in crate::eval) hdr_flip: bool,
+}
+
+impl Settings {
+    /// `small` is the built-in setting, which takes less than a minute.
+    pub(super) fn new(options: &Options, small: bool) -> Result<Settings> {
+        let options = options.clone();
+        let default_methods =
+            vec![Method::Psao, Method::PsaoHat { radius: 1.0 }, Method::Rtao { rays: 16 }, Method::None];
+        let settings = Settings {
+            methods: distinct(options.methods.unwrap_or(default_methods)),
+            paths: distinct(options.path.unwrap_or_default()),
+            seconds: options.seconds.or(small.then_some(2.0)),
+            frames: options.frames.unwrap_or(if small { 2 } else { 4 }),
+            size: options.size.unwrap_or(Size { width: 480, height: 270 }),
+            supersample: options.supersample.unwrap_or(2),
+            points_per_m2: distinct(options.points.unwrap_or_else(|| vec![if small { 256.0 } else { 512.0 }])),
+            hz: distinct(options.hz.unwrap_or_else(|| vec![15.0])),
+            reference_rays: options.reference_rays.unwrap_or(if small { 128 } else { 512 }),
+            radius: options.radius.unwrap_or(Radius::Metres(0.6)),
+            point_rays: options.point_rays.unwrap_or(64),
+            threshold: options.threshold.unwrap_or(4),
+            seed: options.seed.unwrap_or(1),
+            step: StepArgs {
+                ray_budget: options.ray_budget,
+                rays_still: options.rays_still.unwrap_or(0),
+            },
+            hdr_flip: options.hdr_flip.unwrap_or(false),
+        };
+        settings.check()?;
+        Ok(settings)
+    }
+
+    fn check(&self) -> Result<()> {
+        if self.frames == 0 || self.frames > 100_000 {
+            bail!("--frames is {}, must be 1 to 100000", self.frames);
+        }
+        if self.seconds.is_some_and(|s| !(s.is_finite() && s > 0.0)) {
+            bail!("--seconds must be above 0");
+        }
+        if self.size.width < MIN_SIDE || self.size.height < MIN_SIDE {
+            bail!("--size is {}: the metrics need at least {MIN_SIDE}x{MIN_SIDE} pixels", self.size);
+        }
+        if !(1..=8).contains(&self.supersample) {
+            bail!("--supersample is {}, must be 1 to 8", self.supersample);
+        }
+        if !(1..=65536).contains(&self.reference_rays) {
+            bail!("--reference-rays is {}, must be 1 to 65536", self.reference_rays);
+        }
+        if let Some(bad) = self.hz.iter().find(|h| !(h.is_finite() && **h > 0.0 && **h <= 1000.0)) {
+            bail!("--hz has {bad}, must be above 0 to 1000");
+        }
+        if let Some(bad) = self.points_per_m2.iter().find(|n| !(n.is_finite() && **n > 0.0)) {
+            bail!("--points has {bad}, must be above 0");
+        }
+        for (name, empty) in [
+            ("--methods", self.methods.is_empty()),
+            ("--hz", self.hz.is_empty()),
+            ("--points", self.points_per_m2.is_empty()),
+        ] {
+            if empty {
+                bail!("{name} is empty: give at least one, or leave it out");
+            }
+        }
+        Ok(())
+    }
+
+    /// Rays a sample so that a pixel gets at least `rays_per_pixel`.
+    pub(in crate::eval) fn rays_per_sample(&self, rays_per_pixel: u32) -> u32 {
+        rays_per_pixel.div_ceil(self.supersample * self.supersample)
+    }
+}
+
+/// The list without repetitions, in order.
+fn distinct<T: PartialEq>(list: Vec<T>) -> Vec<T> {
+    list.into_iter().fold(Vec::new(), |mut kept, item| {
+        if !kept.contains(&item) {
+            kept.push(item);
+        }
+        kept
+    })
+}

@@ -1,0 +1,129 @@
+//! Suites: TOML files with scenes and settings (docs/suites.md), some of them built in.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use serde::Deserialize;
+
+use super::{Plan, Which, below, entry};
+use crate::args::{EvalArgs, Options};
+use crate::source::read_limited;
+
+/// The largest file that is read.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// Suites that the program brings, by name.
+const BUILTIN: [(&str, &str, &str); 2] = [
+    ("builtins", include_str!("../../../suites/builtins.toml"), "every built-in scene along both of its paths"),
+    (
+        "others",
+        include_str!("../../../suites/others.toml"),
+        "scenes that others made, found with --scenes-folder",
+    ),
+];
+
+/// A suite as its file says it.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Suite {
+    title: Option<String>,
+    /// For every case that says nothing else.
+    #[serde(default)]
+    defaults: Options,
+    #[serde(rename = "case", default)]
+    cases: Vec<toml::Table>,
+}
+
+/// Reads a built-in suite or a file.
+pub(super) fn read(wanted: &str, args: &EvalArgs) -> Result<Plan> {
+    if let Some((name, text, _)) = BUILTIN.iter().find(|(name, _, _)| *name == wanted) {
+        let folder = args.scenes_folder.clone().unwrap_or_default();
+        if args.scenes_folder.is_none() && text.contains("\nscene = ") {
+            bail!("the suite {name} needs --scenes-folder DIR: its scenes are not part of the program");
+        }
+        return plan(text, &folder, &args.options).with_context(|| format!("the suite {name}"));
+    }
+    let path = Path::new(wanted);
+    if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+        let known: Vec<String> = BUILTIN.iter().map(|(name, _, what)| format!("{name} ({what})")).collect();
+        bail!("there is no suite {wanted}: known are {}, or name a .toml file", known.join(" and "));
+    }
+    let bytes = read_limited(path, MAX_BYTES)
+        .with_context(|| format!("cannot read the suite {}", path.display()))?;
+    let text = String::from_utf8(bytes).with_context(|| format!("{} is not UTF-8", path.display()))?;
+    let beside = path.parent().map(Path::to_owned).unwrap_or_default();
+    let folder: PathBuf = args.scenes_folder.clone().unwrap_or(beside);
+    plan(&text, &folder, &args.options).with_context(|| format!("the suite {}", path.display()))
+}
+
+fn plan(text: &str, folder: &Path, flags: &Options) -> Result<Plan> {
+    let suite: Suite = toml::from_str(text)?;
+    if suite.cases.is_empty() {
+        bail!("it has no [[case]]: add at least one, with scene = \"FILE\" or builtin = \"NAME\"");
+    }
+    let mut entries = Vec::new();
+    for (number, mut table) in suite.cases.into_iter().enumerate() {
+        let which = which(&mut table, folder).with_context(|| format!("[[case]] {}", number + 1))?;
+        let own = Options::deserialize(table).with_context(|| format!("[[case]] {}", number + 1))?;
+        let options = flags.clone().or(&own).or(&suite.defaults);
+        entries.push(entry(which, &options, false).with_context(|| format!("[[case]] {}", number + 1))?);
+    }
+    Ok(Plan { title: suite.title.unwrap_or_else(|| "Evaluation".to_owned()), entries })
+}
+
+/// Takes the scene out of a case.
+fn which(table: &mut toml::Table, folder: &Path) -> Result<Which> {
+    match (table.remove("scene"), table.remove("builtin")) {
+        (Some(toml::Value::String(path)), None) => Ok(Which::File(below(folder, Path::new(&path)))),
+        (None, Some(toml::Value::String(name))) => Ok(Which::Builtin(name)),
+        _ => bail!("it must have either scene = \"FILE\" or builtin = \"NAME\""),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::args::{Method, Radius, Size};
+
+    #[test]
+    fn built_in_suites_are_sound() {
+        for (name, text, _) in BUILTIN {
+            let plan = plan(text, Path::new("somewhere"), &Options::default());
+            assert!(plan.is_ok_and(|p| p.entries.len() > 1), "{name}");
+        }
+    }
+
+    #[test]
+    fn flags_override_cases_and_cases_defaults() {
+        let text = "title = \"t\"\n[defaults]\nframes = 7\nradius = 0.25\nsize = \"64x48\"\n\
+                    [[case]]\nscene = \"a/room.glb\"\nframes = 3\nmethods = [\"rtao-4\"]\n\
+                    [[case]]\nbuiltin = \"atrium\"\nradius = \"auto\"\ndetail = 0.5\n";
+        let flags = Options { size: Some(Size { width: 32, height: 32 }), ..Options::default() };
+        let plan = plan(text, Path::new("folder"), &flags).unwrap();
+        let [room, atrium] = &plan.entries[..] else { panic!("{plan:?}") };
+        assert_eq!(plan.title, "t");
+        assert_eq!(room.scene.scene.as_deref(), Some(Path::new("folder/a/room.glb")));
+        assert_eq!((room.settings.frames, atrium.settings.frames), (3, 7));
+        assert_eq!(room.settings.methods, [Method::Rtao { rays: 4 }]);
+        assert_eq!(room.settings.radius, Radius::Metres(0.25));
+        assert_eq!((atrium.settings.radius, atrium.scene.detail), (Radius::Auto, Some(0.5)));
+        assert_eq!(atrium.settings.size, Size { width: 32, height: 32 });
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        for (text, says) in [
+            ("", "[[case]]"),
+            ("[[case]]\n", "scene"),
+            ("[[case]]\nscene = \"a.glb\"\nbuiltin = \"atrium\"\n", "either"),
+            ("[[case]]\nbuiltin = \"atrium\"\nfranes = 3\n", "franes"),
+            ("[[case]]\nbuiltin = \"atrium\"\nmethods = [\"magic\"]\n", "magic"),
+            ("[[case]]\nbuiltin = \"nowhere\"\n", "nowhere"),
+            ("[[case]]\nbuiltin = \"atrium\"\nframes = 0\n", "frames"),
+            ("[[case]\n", "TOML"),
+        ] {
+            let error = plan(text, Path::new(""), &Options::default()).unwrap_err();
+            assert!(format!("{error:#}").contains(says), "{text}: {error:#}");
+        }
+    }
+}
