@@ -15,7 +15,8 @@ pub(super) fn of(case: &Case) -> Vec<String> {
     let frames = case.truth.frames.len();
     if frames < 3 {
         let count = if frames == 1 { "one picture says" } else { "two pictures say" };
-        advice.push(format!("{count} little about the others of the path: intervals need --frames 3 or more"));
+        advice
+            .push(format!("{count} little about the others of the path: intervals need --frames 3 or more"));
     }
     if case.seconds < 1.0 && case.rows.iter().any(|row| row.kbit_per_s.is_some()) {
         advice.push(format!(
@@ -23,7 +24,8 @@ pub(super) fn of(case: &Case) -> Vec<String> {
             case.seconds
         ));
     }
-    let empty: Vec<String> = case.truth.frames.iter().filter(|f| f.covered_pixels == 0).map(seconds).collect();
+    let empty: Vec<String> =
+        case.truth.frames.iter().filter(|f| f.covered_pixels == 0).map(seconds).collect();
     if !empty.is_empty() {
         advice.push(format!(
             "the picture{} at {} s show{} no geometry, so visibility is not compared there: choose another --path",
@@ -54,7 +56,9 @@ fn noise(case: &Case, advice: &mut Vec<String>) {
     let rays = f64::from(case.reference_rays) * noise_mse / (NOISE_PART * mse);
     let enough = 2u64.saturating_pow(rays.log2().ceil().clamp(0.0, 16.0) as u32);
     let what = match noise_mse >= mse {
-        true => format!("the truth's own noise, {noise:.2} %, is as large as the error measured for {name}, {error:.2} %"),
+        true => format!(
+            "the truth's own noise, {noise:.2} %, is as large as the error measured for {name}, {error:.2} %"
+        ),
         false => format!(
             "the truth's own noise, {noise:.2} %, is {:.0} % of the squared error measured for {name}, {error:.2} %",
             100.0 * noise_mse / mse
@@ -65,7 +69,8 @@ fn noise(case: &Case, advice: &mut Vec<String>) {
 
 /// The two best rows, if the frames do not tell them apart.
 fn ties(case: &Case, advice: &mut Vec<String>) {
-    let mut rows: Vec<(&Row, Vec<FrameError>)> = case.rows.iter().map(|row| (row, errors(case, row))).collect();
+    let mut rows: Vec<(&Row, Vec<FrameError>)> =
+        case.rows.iter().map(|row| (row, errors(case, row))).collect();
     rows.retain(|(row, errors)| row.visibility_psnr_db.value.is_some() && errors.len() > 1);
     rows.sort_by(|a, b| {
         let mse = |errors: &[FrameError]| pooled_mse(errors, None).unwrap_or(f64::MAX);

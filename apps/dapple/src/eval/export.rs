@@ -7,17 +7,22 @@ use super::results::{Figure, FrameRow, Results};
 /// One line a row of the results.
 pub(super) fn rows_csv(results: &Results) -> Result<Vec<u8>> {
     let mut csv = csv::Writer::from_writer(Vec::new());
-    let figures = ["visibility_psnr_db", "psnr_db", "ssim", "flip", "hdr_flip", "lpips", "flicker", "kbit_per_s"];
+    let figures =
+        ["visibility_psnr_db", "psnr_db", "ssim", "flip", "hdr_flip", "lpips", "flicker", "kbit_per_s"];
     let mut titles: Vec<String> =
-        ["case", "scene", "path", "method", "points_per_m2", "hz", "rays_per_pixel"].map(str::to_owned).to_vec();
+        ["case", "scene", "path", "method", "points_per_m2", "hz", "rays_per_pixel"]
+            .map(str::to_owned)
+            .to_vec();
     titles.extend(figures.iter().flat_map(|name| [(*name).to_owned(), format!("{name}_ci95")]));
     titles.extend(
-        ["snapshot_bytes", "cut_bytes", "points", "rays", "settled_s", "server_ms", "client_ms"].map(str::to_owned),
+        ["snapshot_bytes", "cut_bytes", "points", "rays", "settled_s", "server_ms", "client_ms"]
+            .map(str::to_owned),
     );
     csv.write_record(&titles)?;
     for case in &results.cases {
         for row in &case.rows {
-            let mut line = vec![case.name.clone(), case.scene.name.clone(), case.path.clone(), row.method.clone()];
+            let mut line =
+                vec![case.name.clone(), case.scene.name.clone(), case.path.clone(), row.method.clone()];
             line.push(text(row.params.points_per_m2));
             line.push(text(row.params.hz));
             line.push(text(row.params.rays_per_pixel));
@@ -51,8 +56,22 @@ pub(super) fn rows_csv(results: &Results) -> Result<Vec<u8>> {
 pub(super) fn frames_csv(results: &Results) -> Result<Vec<u8>> {
     let mut csv = csv::Writer::from_writer(Vec::new());
     csv.write_record([
-        "case", "method", "points_per_m2", "hz", "time_s", "visibility_psnr_db", "psnr_db", "ssim", "flip", "hdr_flip",
-        "lpips", "flicker", "beauty", "visibility", "error", "flip_map",
+        "case",
+        "method",
+        "points_per_m2",
+        "hz",
+        "time_s",
+        "visibility_psnr_db",
+        "psnr_db",
+        "ssim",
+        "flip",
+        "hdr_flip",
+        "lpips",
+        "flicker",
+        "beauty",
+        "visibility",
+        "error",
+        "flip_map",
     ])?;
     for case in &results.cases {
         for row in &case.rows {

@@ -4,8 +4,8 @@ use super::results::Figure;
 
 /// 97.5 % quantiles of Student's t distribution for 1 … 30 degrees of freedom.
 const T975: [f64; 30] = [
-    12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145, 2.131, 2.120,
-    2.110, 2.101, 2.093, 2.086, 2.080, 2.074, 2.069, 2.064, 2.060, 2.056, 2.052, 2.048, 2.045, 2.042,
+    12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160, 2.145, 2.131,
+    2.120, 2.110, 2.101, 2.093, 2.086, 2.080, 2.074, 2.069, 2.064, 2.060, 2.056, 2.052, 2.048, 2.045, 2.042,
 ];
 
 /// The quantile for any number of degrees of freedom above 0.
@@ -136,10 +136,8 @@ mod tests {
 
     #[test]
     fn what_two_settings_share_does_not_widen_their_difference() {
-        let a: Vec<FrameError> =
-            [20.0, 30.0, 25.0].map(|db| FrameError::new(Some(db), 10.0)).to_vec();
-        let b: Vec<FrameError> =
-            [19.0, 29.0, 24.0].map(|db| FrameError::new(Some(db), 10.0)).to_vec();
+        let a: Vec<FrameError> = [20.0, 30.0, 25.0].map(|db| FrameError::new(Some(db), 10.0)).to_vec();
+        let b: Vec<FrameError> = [19.0, 29.0, 24.0].map(|db| FrameError::new(Some(db), 10.0)).to_vec();
         let difference = psnr_difference(&a, &b);
         assert!((difference.value.unwrap() - 1.0).abs() < 1e-9);
         assert!(difference.ci95.unwrap() < 1e-9);

@@ -150,7 +150,8 @@ impl Job {
             settlings = settle(stage, pair, &looks, desk.cache)?.into_iter().map(Some).collect();
         }
         let rows = lines.into_iter().zip(settlings);
-        let rows = rows.map(|(line, settling)| line.finish(stage, pair.as_ref(), settling, desk.truth)).collect();
+        let rows =
+            rows.map(|(line, settling)| line.finish(stage, pair.as_ref(), settling, desk.truth)).collect();
         Ok((Outcome { rows }, recording))
     }
 }
@@ -177,7 +178,14 @@ struct Line {
 
 impl Line {
     fn new(method: Method) -> Line {
-        Line { method, reconstruct_seconds: 0.0, looks: 0, rays: 0, visibility: Vec::new(), frames: Vec::new() }
+        Line {
+            method,
+            reconstruct_seconds: 0.0,
+            looks: 0,
+            rays: 0,
+            visibility: Vec::new(),
+            frames: Vec::new(),
+        }
     }
 
     /// One visibility a sample; all open for `None`.
@@ -243,7 +251,9 @@ impl Line {
     fn see_flicker(&mut self, stage: &Stage<'_>, pair: Option<&Pair>, frame: &Frame) -> Result<()> {
         let drawn = &frame.next.drawn;
         let now = match self.look(stage, pair, drawn) {
-            Some(samples) => dapple_render::compose::resolve_plane(&drawn.gbuffer, &samples, 1.0)?.values.values,
+            Some(samples) => {
+                dapple_render::compose::resolve_plane(&drawn.gbuffer, &samples, 1.0)?.values.values
+            }
             None => vec![1.0; self.visibility.len()],
         };
         let (width, height) = (drawn.gbuffer.width, drawn.gbuffer.height);
@@ -255,11 +265,18 @@ impl Line {
         Ok(())
     }
 
-    fn finish(self, stage: &Stage<'_>, pair: Option<&Pair>, settling: Option<Settling>, truth: &Truth) -> Row {
+    fn finish(
+        self,
+        stage: &Stage<'_>,
+        pair: Option<&Pair>,
+        settling: Option<Settling>,
+        truth: &Truth,
+    ) -> Row {
         let settings = stage.settings;
         let covered: Vec<f64> = truth.frames.iter().map(|f| f.covered_pixels as f64).collect();
         let of = |value: fn(&FrameRow) -> f64| mean(&self.frames.iter().map(value).collect::<Vec<f64>>());
-        let optional = |value: fn(&FrameRow) -> Option<f64>| self.frames.iter().map(value).collect::<Vec<_>>();
+        let optional =
+            |value: fn(&FrameRow) -> Option<f64>| self.frames.iter().map(value).collect::<Vec<_>>();
         let visibility: Vec<FrameError> = self
             .frames
             .iter()

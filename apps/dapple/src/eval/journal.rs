@@ -67,16 +67,12 @@ impl Journal {
     }
 
     /// What the job gave, if it was finished and the files that it names are still there.
-    pub(super) fn get<T: DeserializeOwned>(
-        &self,
-        key: &Key,
-        files: impl Fn(&T) -> Vec<String>,
-    ) -> Option<T> {
+    pub(super) fn get<T: DeserializeOwned>(&self, key: &Key, files: impl Fn(&T) -> Vec<String>) -> Option<T> {
         let bytes = read_limited(&self.file(key), MAX_BYTES).ok()?;
         // What cannot be read was not finished.
         let entry: Entry<T> = serde_json::from_slice(&bytes).ok()?;
-        let whole = entry.key == key.text
-            && files(&entry.value).iter().all(|file| self.out.join(file).is_file());
+        let whole =
+            entry.key == key.text && files(&entry.value).iter().all(|file| self.out.join(file).is_file());
         whole.then_some(entry.value)
     }
 

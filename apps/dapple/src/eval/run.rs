@@ -113,9 +113,7 @@ impl Run<'_> {
         let paths = paths(&loaded, &entry.settings.paths)?;
         let stages: Vec<Stage<'_>> = paths
             .into_iter()
-            .map(|path| {
-                Stage::new(&loaded, &entry.settings, path, radius, starts.tracer().clone())
-            })
+            .map(|path| Stage::new(&loaded, &entry.settings, path, radius, starts.tracer().clone()))
             .collect();
         self.one_case = plan.entries.len() == 1 && stages.len() == 1;
         // Other scenes are taken to be as much work as this one, until they are loaded.
@@ -175,7 +173,7 @@ impl Run<'_> {
             "scene": stage.scene().hash().to_string(),
             "animation": stage.scene().active_animation,
             "path": format!("{:?}", stage.path),
-            "seconds": stage.seconds,
+            "seconds": [stage.seconds, stage.whole_s],
             "times": stage.frame_times_s,
             "size": settings.size.to_string(),
             "supersample": settings.supersample,
@@ -185,7 +183,13 @@ impl Run<'_> {
         })
     }
 
-    fn truth(&mut self, stage: &Stage<'_>, identity: &serde_json::Value, name: &str, slug: &str) -> Result<Truth> {
+    fn truth(
+        &mut self,
+        stage: &Stage<'_>,
+        identity: &serde_json::Value,
+        name: &str,
+        slug: &str,
+    ) -> Result<Truth> {
         let key = self.journal.key(json!({ "truth": identity }));
         let what = format!("{name}: truth");
         let work = stage.truth_work();

@@ -2,21 +2,21 @@
 
 use anyhow::Result;
 use dapple_client::Reconstruction;
-use dapple_metrics::{psnr_masked, settling_time};
+use dapple_metrics::psnr_masked;
 
 use super::pair::Pair;
 use super::plan::CLIENT_HZ;
 use super::results::Settling;
-use super::stage::Stage;
+use super::stage::{Frame, Stage};
 use super::truth::Cache;
 use crate::picture::Shown;
 
 /// Longest time after the move that is watched, seconds; at least three server steps.
 const WATCHED_S: f64 = 1.0;
-/// The error has settled where it stays within this factor of its last value.
-const SETTLED: f64 = 1.1;
+/// The light has settled where this part of the squared difference to what it becomes is left.
+const SETTLED: f64 = 0.05;
 
-/// For each way to look the light up: PSNR of visibility at client frames after the move. The server's next step comes a whole period after
+/// For each way to look the light up: what is shown at client frames after the move. The server's next step comes a whole period after
 /// the move, the worst case. The client draws the new scene at once, with what light it has.
 pub(super) fn settle(
     stage: &Stage<'_>,
@@ -24,11 +24,11 @@ pub(super) fn settle(
     looks: &[Reconstruction],
     cache: &Cache,
 ) -> Result<Vec<Settling>> {
-    let moved_s = (0.5 * stage.seconds * CLIENT_HZ).floor() / CLIENT_HZ;
+    let moved_s = (0.5 * stage.whole_s * CLIENT_HZ).floor() / CLIENT_HZ;
     let frame = stage.middle(moved_s, cache)?;
     let watched_s = WATCHED_S.max(3.0 / pair.hz);
     let frames = (watched_s * CLIENT_HZ).ceil() as u32;
-    let mut errors: Vec<Vec<Option<f64>>> = vec![Vec::new(); looks.len()];
+    let mut shown: Vec<Vec<Look>> = looks.iter().map(|_| Vec::new()).collect();
     let mut after_s = Vec::new();
     let mut steps = 0;
     for number in 0..=frames {
@@ -39,32 +39,62 @@ pub(super) fn settle(
             changed |= pair.step_at(moved_s, stage)?;
         }
         after_s.push(now_s);
-        for (look, errors) in looks.iter().zip(&mut errors) {
-            let error = match errors.last() {
-                Some(last) if !changed => *last,
-                _ => {
-                    let visibility = pair.client.visibility(&frame.drawn, look);
-                    let shown = Shown::new(&frame.drawn, Some(&visibility))?;
-                    let [truth, test] = [&frame.truth, &shown].map(Shown::visibility);
-                    let psnr_db = match frame.truth.covered_pixels {
-                        0 => f64::INFINITY,
-                        _ => psnr_masked(truth, test, frame.truth.covered(), 1.0)?,
-                    };
-                    Some(psnr_db).filter(|db| db.is_finite())
-                }
-            };
-            errors.push(error);
+        for (look, shown) in looks.iter().zip(&mut shown) {
+            if changed {
+                shown.push(Look::new(pair, look, &frame, number as usize)?);
+            }
         }
     }
-    Ok(errors
-        .into_iter()
-        .map(|visibility_psnr_db| {
-            let mse: Vec<f64> = visibility_psnr_db
-                .iter()
-                .map(|db| db.map_or(0.0, |db| libm::pow(10.0, -db / 10.0)))
-                .collect();
-            let settled_s = settling_time(&after_s, &mse, SETTLED);
-            Settling { after_s: after_s.clone(), visibility_psnr_db, settled_s }
-        })
-        .collect())
+    Ok(shown.iter().map(|looks| settling(looks, &frame, &after_s)).collect())
+}
+
+/// What is shown from one client frame on.
+struct Look {
+    since: usize,
+    visibility: Vec<f32>,
+    /// Absent where equal to the truth.
+    psnr_db: Option<f64>,
+}
+
+impl Look {
+    fn new(pair: &Pair, look: &Reconstruction, frame: &Frame, since: usize) -> Result<Look> {
+        let samples = pair.client.visibility(&frame.drawn, look);
+        let visibility = Shown::new(&frame.drawn, Some(&samples))?.into_visibility();
+        let psnr_db = match frame.truth.covered_pixels {
+            0 => f64::INFINITY,
+            _ => psnr_masked(frame.truth.visibility(), &visibility, frame.truth.covered(), 1.0)?,
+        };
+        Ok(Look { since, visibility, psnr_db: Some(psnr_db).filter(|db| db.is_finite()) })
+    }
+}
+
+fn settling(looks: &[Look], frame: &Frame, after_s: &[f64]) -> Settling {
+    let difference = |look: &Look| match looks.last() {
+        Some(last) => mean_square(&look.visibility, &last.visibility, frame.truth.covered()),
+        None => 0.0,
+    };
+    let behind: Vec<f64> = looks.iter().map(difference).collect();
+    let at = |number: usize| looks.partition_point(|look| look.since <= number).saturating_sub(1);
+    let first = behind.first().copied().unwrap_or(0.0);
+    let limit = SETTLED * first;
+    let settled = behind.iter().rposition(|left| *left > limit).map_or(0, |last| last + 1);
+    Settling {
+        after_s: after_s.to_vec(),
+        visibility_psnr_db: (0..after_s.len()).map(|n| looks.get(at(n)).and_then(|l| l.psnr_db)).collect(),
+        behind_rms: (0..after_s.len()).map(|n| behind.get(at(n)).map_or(0.0, |b| b.sqrt())).collect(),
+        settled_s: looks
+            .get(settled)
+            .filter(|_| first > 0.0)
+            .and_then(|look| after_s.get(look.since))
+            .copied(),
+    }
+}
+
+fn mean_square(a: &[f32], b: &[f32], covered: &[bool]) -> f64 {
+    let pairs = a.iter().zip(b).zip(covered).filter(|(_, covered)| **covered);
+    let (sum, count) = pairs.fold((0.0, 0u64), |(sum, count), ((a, b), _)| {
+        let difference = f64::from(*a) - f64::from(*b);
+        (sum + difference * difference, count + 1)
+    });
+    if count == 0 { 0.0 } else { sum / count as f64 }
 }

@@ -66,10 +66,7 @@ pub(super) fn check(results: &Results) -> Result<()> {
             ),
             visibility >= bound.least_visibility_psnr_db,
         );
-        check(
-            format!("{method}: FLIP {flip:.4}, at most {}", bound.most_flip),
-            flip <= bound.most_flip,
-        );
+        check(format!("{method}: FLIP {flip:.4}, at most {}", bound.most_flip), flip <= bound.most_flip);
         check(
             format!("{method}: {kbit:.1} kbit/s, more than 0 and at most {}", bound.most_kbit_per_s),
             kbit > 0.0 && kbit <= bound.most_kbit_per_s,
@@ -97,7 +94,12 @@ pub(super) fn check(results: &Results) -> Result<()> {
 }
 
 fn find<'a>(results: &'a Results, method: &str) -> Result<&'a Row> {
-    results.cases.iter().flat_map(|case| &case.rows).find(|r| r.method == method).with_context(|| format!("no row for {method}"))
+    results
+        .cases
+        .iter()
+        .flat_map(|case| &case.rows)
+        .find(|r| r.method == method)
+        .with_context(|| format!("no row for {method}"))
 }
 
 /// Equal pictures have no finite PSNR.

@@ -44,6 +44,8 @@ pub(super) struct Stage<'a> {
     pub(super) loaded: &'a Loaded,
     pub(super) settings: &'a Settings,
     pub(super) path: CameraPath,
+    /// Length of the path, and how much of it is played.
+    pub(super) whole_s: f64,
     pub(super) seconds: f64,
     pub(super) frame_times_s: Vec<f64>,
     pub(super) radius_m: f32,
@@ -66,18 +68,22 @@ impl<'a> Stage<'a> {
         (radius_m, density_factor): (f32, f32),
         tracer: Tracer,
     ) -> Stage<'a> {
-        let whole = path_seconds(&loaded.scene, &path);
-        let wanted = settings.seconds.unwrap_or(whole);
-        if wanted > whole {
-            tracing::warn!("--seconds {wanted}: the path {} lasts {whole:.2} s, which are played", path.name);
+        let whole_s = path_seconds(&loaded.scene, &path);
+        let wanted = settings.seconds.unwrap_or(whole_s);
+        if wanted > whole_s {
+            tracing::warn!(
+                "--seconds {wanted}: the path {} lasts {whole_s:.2} s, which are played",
+                path.name
+            );
         }
-        let seconds = wanted.min(whole);
+        let seconds = wanted.min(whole_s);
         let frame_times_s = frame_times(settings.frames, seconds);
         let count = frame_times_s.len();
         Stage {
             loaded,
             settings,
             path,
+            whole_s,
             seconds,
             frame_times_s,
             radius_m,

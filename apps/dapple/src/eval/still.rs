@@ -54,7 +54,8 @@ pub(super) fn still_map(
             other.is_some_and(|other| {
                 other.instance == place.instance
                     && other.normal_world.dot(place.normal_world) >= LEAST_COSINE
-                    && (other.position_world - place.position_world).dot(place.normal_world).abs() <= tolerance_m
+                    && (other.position_world - place.position_world).dot(place.normal_world).abs()
+                        <= tolerance_m
             })
         };
         // All four pixels that it is interpolated from.

@@ -28,7 +28,8 @@ pub(super) fn cells(row: &Row) -> [String; COLUMNS.len()] {
         None => "equal".to_owned(),
         Some(_) => text_of(figure, 2),
     };
-    let optional = |figure: &Option<Figure>, digits| figure.as_ref().map_or_else(dash, |f| text_of(f, digits));
+    let optional =
+        |figure: &Option<Figure>, digits| figure.as_ref().map_or_else(dash, |f| text_of(f, digits));
     let visibility = if row.compared_pixels > 0 { equal(&row.visibility_psnr_db) } else { dash() };
     [
         row.method.clone(),
@@ -152,7 +153,10 @@ pub(super) fn markdown(results: &Results) -> String {
     for case in &results.cases {
         text.push_str(&format!("\n## {}\n\n{}\n\n", case.name, conditions(case)));
         for (number, line) in lines(case).iter().enumerate() {
-            text.push_str(&format!("| {} |\n", line.iter().map(|c| escape(c)).collect::<Vec<_>>().join(" | ")));
+            text.push_str(&format!(
+                "| {} |\n",
+                line.iter().map(|c| escape(c)).collect::<Vec<_>>().join(" | ")
+            ));
             if number == 0 {
                 let rules = (0..line.len()).map(|c| if c < 2 { "---" } else { "---:" }).collect::<Vec<_>>();
                 text.push_str(&format!("| {} |\n", rules.join(" | ")));

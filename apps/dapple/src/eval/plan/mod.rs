@@ -78,8 +78,7 @@ fn entry(which: Which, options: &Options, small: bool) -> Result<Entry> {
     let default_detail = if small { Some(DEFAULT_DETAIL) } else { None };
     let (scene, builtin, name, detail) = match which {
         Which::File(path) => {
-            let name =
-                path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+            let name = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
             (Some(path), None, name, None)
         }
         Which::Builtin(name) => {

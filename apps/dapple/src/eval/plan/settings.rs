@@ -44,17 +44,16 @@ impl Settings {
             frames: options.frames.unwrap_or(if small { 2 } else { 4 }),
             size: options.size.unwrap_or(Size { width: 480, height: 270 }),
             supersample: options.supersample.unwrap_or(2),
-            points_per_m2: distinct(options.points.unwrap_or_else(|| vec![if small { 256.0 } else { 512.0 }])),
+            points_per_m2: distinct(
+                options.points.unwrap_or_else(|| vec![if small { 256.0 } else { 512.0 }]),
+            ),
             hz: distinct(options.hz.unwrap_or_else(|| vec![15.0])),
             reference_rays: options.reference_rays.unwrap_or(if small { 128 } else { 512 }),
             radius: options.radius.unwrap_or(Radius::Metres(0.6)),
             point_rays: options.point_rays.unwrap_or(64),
             threshold: options.threshold.unwrap_or(4),
             seed: options.seed.unwrap_or(1),
-            step: StepArgs {
-                ray_budget: options.ray_budget,
-                rays_still: options.rays_still.unwrap_or(0),
-            },
+            step: StepArgs { ray_budget: options.ray_budget, rays_still: options.rays_still.unwrap_or(0) },
             hdr_flip: options.hdr_flip.unwrap_or(false),
         };
         settings.check()?;

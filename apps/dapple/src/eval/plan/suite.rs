@@ -14,7 +14,11 @@ const MAX_BYTES: u64 = 1 << 20;
 
 /// Suites that the program brings, by name.
 const BUILTIN: [(&str, &str, &str); 2] = [
-    ("builtins", include_str!("../../../suites/builtins.toml"), "every built-in scene along both of its paths"),
+    (
+        "builtins",
+        include_str!("../../../suites/builtins.toml"),
+        "every built-in scene along both of its paths",
+    ),
     (
         "others",
         include_str!("../../../suites/others.toml"),
@@ -48,8 +52,8 @@ pub(super) fn read(wanted: &str, args: &EvalArgs) -> Result<Plan> {
         let known: Vec<String> = BUILTIN.iter().map(|(name, _, what)| format!("{name} ({what})")).collect();
         bail!("there is no suite {wanted}: known are {}, or name a .toml file", known.join(" and "));
     }
-    let bytes = read_limited(path, MAX_BYTES)
-        .with_context(|| format!("cannot read the suite {}", path.display()))?;
+    let bytes =
+        read_limited(path, MAX_BYTES).with_context(|| format!("cannot read the suite {}", path.display()))?;
     let text = String::from_utf8(bytes).with_context(|| format!("{} is not UTF-8", path.display()))?;
     let beside = path.parent().map(Path::to_owned).unwrap_or_default();
     let folder: PathBuf = args.scenes_folder.clone().unwrap_or(beside);
