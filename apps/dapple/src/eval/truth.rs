@@ -89,7 +89,7 @@ impl Cache {
                 // Visibility is a whole number of rays out of all of them.
                 let counts: Vec<u32> =
                     visibility.iter().map(|v| (v * request.rays as f32).round() as u32).collect();
-                write_file(&file, &encode(&counts, request.rays))?;
+                write_file(&file, &encode(&counts, request.rays)?)?;
                 counts
             }
         };
@@ -152,17 +152,18 @@ fn assemble(request: &Request<'_>, indices: &[usize], again: &[usize], counts: &
     Traced { visibility, noise_mse }
 }
 
-/// A header, the counts (one byte each where the rays allow it), and their hash.
-fn encode(counts: &[u32], rays: u32) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(16 + counts.len() * width(rays) + 32);
-    bytes.extend(b"dapplet1");
-    bytes.extend((counts.len() as u64).to_le_bytes());
+/// A header, the counts (one byte each where the rays allow it, compressed), and a hash of all that.
+fn encode(counts: &[u32], rays: u32) -> std::io::Result<Vec<u8>> {
+    let mut plain = Vec::with_capacity(counts.len() * width(rays));
     for count in counts {
-        bytes.extend(&count.to_le_bytes()[..width(rays)]);
+        plain.extend(&count.to_le_bytes()[..width(rays)]);
     }
+    let mut bytes = b"dapplet1".to_vec();
+    bytes.extend((counts.len() as u64).to_le_bytes());
+    bytes.extend(zstd::bulk::compress(&plain, 3)?);
     let hash = blake3::hash(&bytes);
     bytes.extend(hash.as_bytes());
-    bytes
+    Ok(bytes)
 }
 
 /// Bytes a count.
@@ -182,10 +183,10 @@ fn read(file: &Path, wanted: usize, rays: u32) -> Option<Vec<u32>> {
     let (count, rest) = rest.split_at_checked(8)?;
     let whole = magic == b"dapplet1"
         && count == (wanted as u64).to_le_bytes()
-        && rest.len() == wanted * width(rays)
         && blake3::hash(body).as_bytes() == hash;
+    let plain = zstd::bulk::decompress(rest, whole.then_some(wanted * width(rays))?).ok()?;
     let number = |bytes: &[u8]| bytes.iter().rev().fold(0, |n, byte| n << 8 | u32::from(*byte));
-    whole.then(|| rest.chunks(width(rays)).map(number).collect())
+    (plain.len() == wanted * width(rays)).then(|| plain.chunks(width(rays)).map(number).collect())
 }
 
 #[cfg(test)]
@@ -197,7 +198,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("a.truth");
         for (rays, counts) in [(64, vec![0, 1, 64, 33]), (512, vec![0, 512, 300]), (65536, vec![65536, 7])] {
-            let bytes = encode(&counts, rays);
+            let bytes = encode(&counts, rays).unwrap();
             std::fs::write(&file, &bytes).unwrap();
             assert_eq!(read(&file, counts.len(), rays), Some(counts.clone()));
             assert_eq!(read(&file, counts.len() + 1, rays), None);
