@@ -97,6 +97,12 @@ pub enum MetricError {
         /// Values allowed.
         range: &'static str,
     },
+    /// Numbers within the metric exceed what floats can hold.
+    #[error("{metric} overflowed: its weights are too large to be those of a trained network")]
+    Overflow {
+        /// The metric.
+        metric: &'static str,
+    },
 }
 
 /// Checks that both slices hold `width * height * channels` values and at least one.
