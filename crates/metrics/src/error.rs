@@ -97,6 +97,9 @@ pub enum MetricError {
         /// Values allowed.
         range: &'static str,
     },
+    /// The reference is black.
+    #[error("the reference has no light in it, which no exposure shows: give the exposures")]
+    Black,
     /// Numbers within the metric exceed what floats can hold.
     #[error("{metric} overflowed: its weights are too large to be those of a trained network")]
     Overflow {

@@ -9,6 +9,7 @@
 //! | [`psnr()`] | higher, ∞ when equal | any number of channels, any range |
 //! | [`ssim()`] | higher, 1 when equal | luma, 0 … 1 |
 //! | [`flip()`] | lower, 0 when equal | sRGB, 8 bits a channel |
+//! | [`flip_hdr()`] | lower, 0 when equal | linear sRGB of any brightness |
 //! | [`Lpips::distance`] | lower, 0 when equal | sRGB, 8 bits a channel |
 
 mod error;
@@ -20,7 +21,7 @@ mod ssim;
 mod test_images;
 
 pub use error::MetricError;
-pub use flip::{Flip, PIXELS_PER_DEGREE, flip, magma_srgb8};
+pub use flip::{Exposures, Flip, HdrFlip, PIXELS_PER_DEGREE, flip, flip_hdr, magma_srgb8};
 pub use lpips::{LPIPS_MAX_PIXELS, LPIPS_MIN_SIDE, Lpips, LpipsMap, WeightsError};
 pub use psnr::{psnr, psnr_masked};
 pub use ssim::{SSIM_MIN_SIDE, ssim};
