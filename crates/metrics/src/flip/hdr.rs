@@ -52,11 +52,13 @@ impl Exposures {
     /// No pixel, a number of values that is no multiple of 3, a value that is not finite, a picture without any light.
     pub fn of(linear_rgb: &[f32]) -> Result<Exposures, MetricError> {
         let (pixels, rest) = linear_rgb.as_chunks::<3>();
-        if pixels.is_empty() || !rest.is_empty() {
-            return Err(MetricError::Empty {
-                width: pixels.len() as u32,
-                height: u32::from(!rest.is_empty()),
-            });
+        if !rest.is_empty() {
+            let (width, found) = (pixels.len() as u32 + 1, linear_rgb.len());
+            let expected = 3 * (pixels.len() as u64 + 1);
+            return Err(MetricError::WrongLength { width, height: 1, channels: 3, expected, found });
+        }
+        if pixels.is_empty() {
+            return Err(MetricError::Empty { width: 0, height: 0 });
         }
         check_finite("reference", linear_rgb)?;
         let space = Space::srgb();
@@ -183,7 +185,8 @@ mod tests {
         assert_eq!(two.start, two.stop);
         assert_eq!(Exposures::of(&[0.0; 6]), Err(MetricError::Black));
         assert_eq!(Exposures::of(&[-1.0; 6]), Err(MetricError::Black));
-        assert!(matches!(Exposures::of(&[1.0; 4]), Err(MetricError::Empty { .. })));
+        assert!(matches!(Exposures::of(&[1.0; 4]), Err(MetricError::WrongLength { expected: 6, .. })));
+        assert!(matches!(Exposures::of(&[]), Err(MetricError::Empty { .. })));
         // Black for the most part: 2⁻²³ is the least that counts.
         let night = Exposures::of(&[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]).unwrap();
         assert!((night.stop - night.start - 23.0).abs() < 1e-5 && night.count == 23, "{night:?}");
