@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # Installs what a build needs and this machine lacks, where apt-get and the rights to use it are at hand.
 #
-# scripts/setup.sh          for `make demo`: make, a C and C++ compiler (FLIP and zstd come as source) and Rust
+# scripts/setup.sh          for `make demo`: make, a C compiler (zstd comes as source) and Rust
 # scripts/setup.sh web      for `make web`: the same, and Rust's compiler for browsers
-# scripts/setup.sh test     for `make test`: all that, git, rustfmt and clippy; and what draws without a graphics card
+# scripts/setup.sh test     for `make test`: all that, a C++ compiler (for another FLIP to compare with), git, rustfmt and
+#                           clippy; and what draws without a graphics card
 #                           (Mesa's Vulkan driver) and shows pages (Chromium, Node.js, npm), whose tests are skipped
 #                           where they cannot be had
 #
@@ -17,7 +18,7 @@ stop() { printf 'setup: %s\n' "$@" >&2; exit 1; }
 # --- packages ---------------------------------------------------------------------------------------------------
 
 missing=()
-has cc && has c++ && has make || missing+=(build-essential)
+has cc && has make && { [ "${1:-}" != test ] || has c++; } || missing+=(build-essential)
 if [ "${1:-}" = test ]; then has git || missing+=(git); fi
 # Only rustup's installer needs it.
 if ! has cargo; then has curl || missing+=(curl ca-certificates); fi
@@ -45,7 +46,7 @@ install() {
 
 if [ ${#missing[@]} -gt 0 ]; then
     has apt-get || stop "missing: ${missing[*]} (Debian's names), and there is no apt-get here." \
-        "Install a C and a C++ compiler, git and curl by your system's means, then run this again."
+        "Install a C and a C++ compiler, make, git and curl by your system's means, then run this again."
     $may_install || stop "missing: ${missing[*]}, and there are no rights to install them. Run:" \
         "    sudo apt-get install ${missing[*]}"
     install "${missing[@]}"

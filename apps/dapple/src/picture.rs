@@ -5,7 +5,9 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use dapple_client::Drawn;
-use dapple_metrics::{Lpips, PIXELS_PER_DEGREE, flip, flip_hdr, magma_srgb8, psnr, psnr_masked, ssim};
+use dapple_metrics::{
+    Lpips, MetricError, PIXELS_PER_DEGREE, flip, flip_hdr, magma_srgb8, psnr, psnr_masked, ssim,
+};
 use dapple_render::compose::{ErrorKind, ResolvedPlane, resolve_plane, view_error, view_visibility};
 use dapple_render::image::{Rgb8Image, ToneMap};
 use dapple_scene::Scene;
@@ -168,10 +170,12 @@ impl Compared {
         let linear = |shown: &Shown| shown.radiance.iter().flat_map(|p| p.to_array()).collect::<Vec<f32>>();
         let hdr_flip = match judges.hdr_flip {
             false => None,
-            true => {
-                let found = flip_hdr(width, height, &linear(truth), &linear(test), PIXELS_PER_DEGREE, None)?;
-                Some(found.mean)
-            }
+            true => match flip_hdr(width, height, &linear(truth), &linear(test), PIXELS_PER_DEGREE, None) {
+                Ok(found) => Some(found.mean),
+                // A black picture has no exposures.
+                Err(MetricError::Black) => None,
+                Err(error) => return Err(error.into()),
+            },
         };
         let lpips = judges.lpips.as_ref().map(|lpips| lpips.distance(width, height, truth_rgb, test_rgb));
         Ok(Compared {

@@ -6,20 +6,28 @@
 //!
 //! | metric | better is | input |
 //! |---|---|---|
-//! | [`psnr()`] | higher, ∞ when equal | any number of channels, any range |
-//! | [`ssim()`] | higher, 1 when equal | luma, 0 … 1 |
+//! | [`psnr()`], [`error_map()`] | higher, ∞ when equal | any number of channels, any range |
+//! | [`ssim()`], [`ssim_map()`] | higher, 1 when equal | luma, 0 … 1 |
 //! | [`flip()`] | lower, 0 when equal | sRGB, 8 bits a channel |
+//! | [`flip_hdr()`] | lower, 0 when equal | linear sRGB of any brightness |
+//! | [`Lpips::distance`] | lower, 0 when equal | sRGB, 8 bits a channel |
+//! | [`Flicker`], [`StillFlicker`] | lower, 0 when steady | pictures of a sequence, any range |
+//! | [`settling`] | lower, sooner | an error over time |
 
 mod error;
+mod errors;
 mod flip;
+mod lpips;
 mod psnr;
-mod shim;
-pub use shim::*;
 mod ssim;
+mod temporal;
 #[cfg(test)]
 mod test_images;
 
 pub use error::MetricError;
-pub use flip::{Flip, PIXELS_PER_DEGREE, flip, magma_srgb8};
+pub use errors::{PixelError, error_map};
+pub use flip::{Exposures, Flip, HdrFlip, PIXELS_PER_DEGREE, flip, flip_hdr, magma_srgb8};
+pub use lpips::{LPIPS_MAX_PIXELS, LPIPS_MIN_SIDE, Lpips, LpipsMap, WeightsError};
 pub use psnr::{psnr, psnr_masked};
-pub use ssim::{SSIM_MIN_SIDE, ssim};
+pub use ssim::{SSIM_MIN_SIDE, SsimMap, ssim, ssim_map};
+pub use temporal::{Flicker, Settling, StillFlicker, settling};

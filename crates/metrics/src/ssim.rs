@@ -36,6 +36,44 @@ const C2: f64 = 0.03 * 0.03;
 /// # Errors
 /// Sizes that do not fit, a side under [`SSIM_MIN_SIDE`], a value that is not finite.
 pub fn ssim(width: u32, height: u32, reference: &[f32], test: &[f32]) -> Result<f64, MetricError> {
+    let row_sums: Vec<f64> = map_rows(width, height, reference, test, |similarities| similarities.sum())?;
+    let windows = row_sums.len() * (width as usize - WINDOW + 1);
+    Ok(row_sums.iter().sum::<f64>() / windows as f64)
+}
+
+/// The outcome of [`ssim_map`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct SsimMap {
+    /// What [`ssim`] gives.
+    pub mean: f64,
+    /// Width of the map: 10 less than that of the image.
+    pub width: u32,
+    /// Height of the map: 10 less than that of the image.
+    pub height: u32,
+    /// SSIM of every window, −1 … 1, in rows from the top: first that around the pixel (5, 5).
+    pub map: Vec<f32>,
+}
+
+/// As [`ssim`], with the similarity of every window.
+///
+/// # Errors
+/// As [`ssim`].
+pub fn ssim_map(width: u32, height: u32, reference: &[f32], test: &[f32]) -> Result<SsimMap, MetricError> {
+    let mean = ssim(width, height, reference, test)?;
+    let rows: Vec<Vec<f32>> =
+        map_rows(width, height, reference, test, |similarities| similarities.map(|s| s as f32).collect())?;
+    let margin = SSIM_MIN_SIDE - 1;
+    Ok(SsimMap { mean, width: width - margin, height: height - margin, map: rows.concat() })
+}
+
+/// What `found` makes of the similarities of each row of windows.
+fn map_rows<T: Send>(
+    width: u32,
+    height: u32,
+    reference: &[f32],
+    test: &[f32],
+    found: impl Fn(&mut dyn Iterator<Item = f64>) -> T + Sync,
+) -> Result<Vec<T>, MetricError> {
     check_size(width, height, 1, reference, test)?;
     if width < SSIM_MIN_SIDE || height < SSIM_MIN_SIDE {
         return Err(MetricError::TooSmall { width, height, minimum: SSIM_MIN_SIDE });
@@ -45,21 +83,18 @@ pub fn ssim(width: u32, height: u32, reference: &[f32], test: &[f32]) -> Result<
 
     let (width, height) = (width as usize, height as usize);
     let weights = gaussian();
-    let row_sums: Vec<f64> = (0..height - WINDOW + 1)
-        .into_par_iter()
-        .map(|top| {
-            let rows = top * width..(top + WINDOW) * width;
-            row_sum(width, &reference[rows.clone()], &test[rows], &weights)
-        })
-        .collect();
-    let windows = row_sums.len() * (width - WINDOW + 1);
-    Ok(row_sums.iter().sum::<f64>() / windows as f64)
+    let tops = (0..height - WINDOW + 1).into_par_iter();
+    let rows = tops.map(|top| {
+        let rows = top * width..(top + WINDOW) * width;
+        let columns = column_moments(width, &reference[rows.clone()], &test[rows], &weights);
+        found(&mut columns.windows(WINDOW).map(|window| similarity(moments(window, &weights))))
+    });
+    Ok(rows.collect())
 }
 
-/// Sum of the SSIM of all windows in one band of [`WINDOW`] rows. The weights are separable: columns first, then
-/// along the row.
-fn row_sum(width: usize, reference: &[f32], test: &[f32], weights: &[f64; WINDOW]) -> f64 {
-    // Weighted column sums of x, y, x², y², xy.
+/// Weighted sums of x, y, x², y², xy down each column of a band of [`WINDOW`] rows. The weights are separable: columns
+/// first, then along the row.
+fn column_moments(width: usize, reference: &[f32], test: &[f32], weights: &[f64; WINDOW]) -> Vec<[f64; 5]> {
     let mut columns = vec![[0.0f64; 5]; width];
     let rows = reference.chunks_exact(width).zip(test.chunks_exact(width));
     for (weight, (reference_row, test_row)) in weights.iter().zip(rows) {
@@ -72,17 +107,17 @@ fn row_sum(width: usize, reference: &[f32], test: &[f32], weights: &[f64; WINDOW
         }
     }
     columns
-        .windows(WINDOW)
-        .map(|window| {
-            let mut moments = [0.0f64; 5];
-            for (weight, column) in weights.iter().zip(window) {
-                for (moment, value) in moments.iter_mut().zip(column) {
-                    *moment += weight * value;
-                }
-            }
-            similarity(moments)
-        })
-        .sum()
+}
+
+/// The moments of a window from those of its columns.
+fn moments(columns: &[[f64; 5]], weights: &[f64; WINDOW]) -> [f64; 5] {
+    let mut moments = [0.0f64; 5];
+    for (weight, column) in weights.iter().zip(columns) {
+        for (moment, value) in moments.iter_mut().zip(column) {
+            *moment += weight * value;
+        }
+    }
+    moments
 }
 
 /// Eq. 13 from the weighted means of x, y, x², y², xy.
@@ -150,6 +185,20 @@ mod tests {
         let there = ssim(40, 30, &reference, &test).unwrap();
         let back = ssim(40, 30, &test, &reference).unwrap();
         assert!((there - back).abs() < 1e-12 && there < 1.0);
+    }
+
+    #[test]
+    fn the_map_holds_every_window() {
+        let (reference, test) = noisy_pair(40, 25);
+        let found = ssim_map(40, 25, &reference, &test).unwrap();
+        assert_eq!((found.width, found.height, found.map.len()), (30, 15, 450));
+        assert_eq!(found.mean, ssim(40, 25, &reference, &test).unwrap());
+        // The window around (12, 9) alone, as a picture of one window.
+        let cut = |image: &[f32]| {
+            (4..15).flat_map(|y| image[y * 40 + 7..y * 40 + 18].to_vec()).collect::<Vec<f32>>()
+        };
+        let alone = ssim(11, 11, &cut(&reference), &cut(&test)).unwrap();
+        assert_eq!(found.map[4 * 30 + 7], alone as f32);
     }
 
     #[test]

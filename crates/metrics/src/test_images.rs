@@ -12,6 +12,7 @@
 //! smooth_t = min(smooth_r + (8 if (x // 8 + y // 8) % 2 else 0), 255)
 //! rgb_r[c] = ((c + 2) * x + (5 - c) * y + (h(x // 4, y // 4, c) & 63)) & 255
 //! rgb_t[c] = (rgb_r[c] * 7 + (h(x, y, c + 3) & 255)) >> 3
+//! hdr_r = (rgb_r + 1) / 256 * 2.0 ** ((x // 8 + y // 8) % 12 - 6)        # and so hdr_t
 //! ```
 
 /// Three rounds of multiply and shift: neighbouring pixels get unrelated values.
@@ -56,6 +57,20 @@ pub(crate) fn color_pair(width: u32, height: u32) -> (Vec<u8>, Vec<u8>) {
             (r as u8, ((r * 7 + (hash(x, y, c + 3) & 255)) >> 3) as u8)
         })
         .unzip()
+}
+
+/// The same in blocks of twelve brightnesses; linear light.
+pub(crate) fn hdr_pair(width: u32, height: u32) -> (Vec<f32>, Vec<f32>) {
+    let (reference, test) = color_pair(width, height);
+    let lit = |picture: Vec<u8>| {
+        let values = picture.into_iter().zip(0..);
+        let lit = values.map(|(byte, i)| {
+            let (x, y) = (i / 3 % width, i / 3 / width);
+            (f32::from(byte) + 1.0) / 256.0 * ((1 << ((x / 8 + y / 8) % 12)) as f32 / 64.0)
+        });
+        lit.collect()
+    };
+    (lit(reference), lit(test))
 }
 
 /// Runs `work` in pools of 1, 2 and 5 threads and compares what it returns.
