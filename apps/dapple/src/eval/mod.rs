@@ -1,8 +1,14 @@
 //! `dapple eval`: server and client in one process along a camera path, against ray-traced truth.
 
 pub(crate) mod quality;
+#[path = "report.rs"]
 mod report;
+#[allow(dead_code, reason = "shown by the evaluation of schema 2")]
+#[path = "report/mod.rs"]
+mod report_2;
 mod results;
+#[allow(dead_code, reason = "written by the evaluation of schema 2")]
+mod results_2;
 mod run;
 mod samples;
 mod settings;
