@@ -50,13 +50,23 @@ const fn cost(key: &'static str, title: &'static str, unit: &'static str, digits
 /// Key of the figure that the summary goes by.
 pub(super) const VISIBILITY: &str = "visibility_psnr_db";
 
-/// All columns after those that name a row.
+/// All columns after those that name a row: first what most look for.
 pub(super) const COLUMNS: [Column; 16] = [
     Column {
         explanation: "PSNR of visibility against the truth over all pixels that show geometry; the mean squared error is \
             pooled over the pictures",
         get: visibility,
         ..quality(VISIBILITY, "visibility", "dB", 2)
+    },
+    Column {
+        explanation: "bits of all updates over the path, headers included, snapshot not; 1 kbit = 1000 bits",
+        get: |row| row.kbit_per_s,
+        ..cost("kbit_per_s", "updates", "kbit/s", 1)
+    },
+    Column {
+        explanation: "the snapshot that a new client receives on joining",
+        get: |row| row.snapshot_bytes.map(|bytes| exact(bytes as f64 / 1e3)),
+        ..cost("snapshot_kb", "join", "kB", 0)
     },
     Column {
         explanation: "PSNR of the whole 8-bit picture, pooled alike",
@@ -93,16 +103,6 @@ pub(super) const COLUMNS: [Column; 16] = [
         more_is_better: false,
         get: |row| row.flicker,
         ..quality("flicker", "flicker", "", 3)
-    },
-    Column {
-        explanation: "bits of all updates over the path, headers included, snapshot not; 1 kbit = 1000 bits",
-        get: |row| row.kbit_per_s,
-        ..cost("kbit_per_s", "updates", "kbit/s", 1)
-    },
-    Column {
-        explanation: "the snapshot that a new client receives on joining",
-        get: |row| row.snapshot_bytes.map(|bytes| exact(bytes as f64 / 1e3)),
-        ..cost("snapshot_kb", "join", "kB", 0)
     },
     Column {
         explanation: "of the snapshot: which points do not count at which texels",
@@ -196,6 +196,15 @@ pub(super) fn bits(kbit_per_s: f64) -> String {
         k if k >= 100.0 => format!("{} kbit/s", number(k, 0)),
         k if k > 0.0 => format!("{} kbit/s", number(k, 1)),
         _ => "0 kbit/s".to_owned(),
+    }
+}
+
+/// Bytes in the unit that reads best.
+pub(super) fn bytes(count: u64) -> String {
+    match count as f64 {
+        b if b >= 1e6 => format!("{} MB", number(b / 1e6, 1)),
+        b if b >= 1e3 => format!("{} kB", number(b / 1e3, 0)),
+        b => format!("{} B", number(b, 0)),
     }
 }
 

@@ -6,6 +6,8 @@
 mod columns;
 mod island;
 mod pictures;
+#[cfg(test)]
+mod tests;
 mod words;
 
 use std::fmt::Write;

@@ -107,7 +107,7 @@ fn order(results: &Results) -> Vec<(usize, usize)> {
 }
 
 /// All moments of a case: worst ones and evenly spread ones in turn.
-fn order_in(case: &Case) -> Vec<usize> {
+pub(super) fn order_in(case: &Case) -> Vec<usize> {
     let count = case.rows.iter().map(|row| row.frames.len()).max().unwrap_or(0).max(case.truth.frames.len());
     let mut worst = Vec::new();
     let measures: [fn(&FrameRow) -> f64; 2] =
@@ -133,7 +133,7 @@ fn order_in(case: &Case) -> Vec<usize> {
 }
 
 /// `0 … count` so that any first part is spread evenly: both ends, then middles of what lies between.
-fn spread(count: usize) -> Vec<usize> {
+pub(super) fn spread(count: usize) -> Vec<usize> {
     let mut order: Vec<usize> = [0, count.saturating_sub(1)].into_iter().take(count).collect();
     let mut gaps = vec![(0, count.saturating_sub(1))];
     while !gaps.is_empty() {

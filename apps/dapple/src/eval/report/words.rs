@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::columns::{self, Column, Kind, Setting, bits, number, rank};
+use super::columns::{self, Column, Kind, Setting, bits, bytes, number, rank};
 use super::results::{Case, Figure, Results, Row};
 
 /// Text as HTML, in an attribute too.
@@ -80,8 +80,9 @@ fn headline<'a>(case: &'a Case, settings: &'a [Setting]) -> Option<Headline<'a>>
 fn decibels(figure: Figure) -> String {
     match (figure.value, figure.ci95) {
         (None, _) => "equal to the truth".to_owned(),
-        (Some(value), None) => format!("{} dB", number(value, 1)),
-        (Some(value), Some(ci95)) => format!("{} ± {} dB", number(value, 1), number(ci95, 1)),
+        // Spaces that do not break: a number stays with its unit.
+        (Some(value), None) => format!("{}\u{a0}dB", number(value, 1)),
+        (Some(value), Some(ci95)) => format!("{}\u{a0}±\u{a0}{}\u{a0}dB", number(value, 1), number(ci95, 1)),
     }
 }
 
@@ -110,8 +111,7 @@ fn lead_of_one(headline: &Headline) -> String {
     let mut text = format!("{} reaches <b>{}</b> of visibility", named(best), decibels(best.figure));
     match (best.row.kbit_per_s.and_then(|f| f.value), best.row.snapshot_bytes) {
         (Some(kbit), Some(join)) => {
-            let _ =
-                write!(text, " at <b>{}</b>, after {} kB to join", bits(kbit), number(join as f64 / 1e3, 0));
+            let _ = write!(text, " at <b>{}</b>, after {} to join", bits(kbit), bytes(join));
         }
         (Some(kbit), None) => {
             let _ = write!(text, " at <b>{}</b>", bits(kbit));
@@ -165,16 +165,12 @@ fn lead_of_many(headlines: &[(&Case, Headline)]) -> String {
     wins.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
     let (winner, count) = wins[0];
     let of_winner = || headlines.iter().map(|(_, h)| h).filter(|h| h.best.row.method == winner);
-    let mut text = match count == headlines.len() {
-        true => format!("<b>{}</b> is nearest to the truth in all {count} cases", escape(winner)),
-        false => {
-            format!(
-                "<b>{}</b> is nearest to the truth in {count} of {} cases",
-                escape(winner),
-                headlines.len()
-            )
-        }
+    let share = match (count, headlines.len()) {
+        (2, 2) => "both cases".to_owned(),
+        (count, all) if count == all => format!("all {all} cases"),
+        (count, all) => format!("{count} of {all} cases"),
     };
+    let mut text = format!("<b>{}</b> is nearest to the truth in {share}", escape(winner));
     if let Some((low, high)) = range(of_winner().filter_map(|h| h.best.figure.value)) {
         let _ = write!(text, ", with {} of visibility", between(low, high, 1, "dB"));
     }
@@ -198,8 +194,8 @@ fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 
 fn between(low: f64, high: f64, digits: usize, unit: &str) -> String {
     match (number(low, digits), number(high, digits)) {
-        (low, high) if low == high => format!("<b>{low} {unit}</b>"),
-        (low, high) => format!("<b>{low} to {high} {unit}</b>"),
+        (low, high) if low == high => format!("<b>{low}\u{a0}{unit}</b>"),
+        (low, high) => format!("<b>{low} to {high}\u{a0}{unit}</b>"),
     }
 }
 
@@ -241,7 +237,7 @@ pub(super) fn headlines(results: &Results) -> String {
                     let sign = if gain > 0.0 { "+" } else { "" };
                     let doubt =
                         if clear { "" } else { " <i title=\"less than the intervals tell apart\">(?)</i>" };
-                    format!("{sign}{} dB{doubt}", number(gain, 1))
+                    format!("{sign}{}\u{a0}dB{doubt}", number(gain, 1))
                 },
             ),
             short(&found.traced, true),

@@ -100,9 +100,11 @@ function settingOf(row, without = null) {
   return row.setting.filter(([key]) => key !== without).map(([, words]) => words).join(", ");
 }
 
-/** A row's name in one line. */
+/** A row's name in one line. A method's own name may say its rays, as `rtao-16` does. */
 function rowName(row) {
-  return [row.method, settingOf(row)].filter(Boolean).join(" · ");
+  const rays = row.params.rays_per_pixel;
+  const said = rays !== undefined && row.method.endsWith(`-${rays}`) ? "rays_per_pixel" : null;
+  return [row.method, settingOf(row, said)].filter(Boolean).join(" · ");
 }
 
 /** The name of a row of a case, or of the truth. */

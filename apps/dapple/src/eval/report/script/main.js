@@ -16,7 +16,10 @@ function worstOf(row, column) {
   return list.sort((a, b) => sign * (a.value - b.value) || a.frame - b.frame).slice(0, WORST);
 }
 
-function drawWorst(caseIndex) {
+const worstState = { one: 0, all: false };
+
+function drawWorst() {
+  const caseIndex = worstState.one;
   const found = cases[caseIndex];
   const list = document.getElementById("worst-list");
   list.replaceChildren();
@@ -24,7 +27,8 @@ function drawWorst(caseIndex) {
     list.append(make("p", { className: "empty" }, "There is no picture to choose from."));
     return;
   }
-  for (const [index, row] of found.rows.entries()) {
+  for (const index of worstState.all ? found.rows.keys() : bestRows(caseIndex)) {
+    const row = found.rows[index];
     const groups = WORST_BY.filter(({ key }) => columns.has(key) && row.frames[key]).map(({ key, view, words }) => {
       const column = columns.get(key);
       const thumbs = worstOf(row, column).map(({ value, frame }) => {
@@ -57,27 +61,47 @@ function startWorst() {
   }
   if (cases.length > 1) {
     const options = cases.map((one, i) => [String(i), one.name]);
-    document.getElementById("worst-controls").append(select("case", options, "0", (value) => drawWorst(Number(value))));
+    document.getElementById("worst-controls").append(select("case", options, "0", (value) => {
+      worstState.one = Number(value);
+      drawWorst();
+    }));
+  }
+  if (cases.some((one, index) => bestRows(index).length < one.rows.length)) {
+    const options = [[false, "Best setting of each method"], [true, "All settings"]];
+    document.getElementById("worst-controls").append(segments("Rows", options, worstState.all, (all) => {
+      worstState.all = all;
+      drawWorst();
+    }));
   }
   if (cases.every((_, index) => frameCount(index) < 2)) {
     document.getElementById("worst-controls").append(make("p", { className: "note" }, "There is one picture only, which is the best one too."));
   }
-  drawWorst(0);
+  drawWorst();
 }
 
 /** Marks the section that fills the window. */
 function startContents() {
   const links = new Map([...document.querySelectorAll("#contents a")].map((link) => [link.hash.slice(1), link]));
-  const observer = new IntersectionObserver((entries) => {
-    for (const entry of entries) {
-      if (!entry.isIntersecting) continue;
-      for (const [id, link] of links) {
-        if (id === entry.target.id) link.setAttribute("aria-current", "true");
-        else link.removeAttribute("aria-current");
-      }
+  const sections = [...links.keys()].map((id) => document.getElementById(id));
+  const mark = () => {
+    const atEnd = scrollY + innerHeight > document.documentElement.scrollHeight - 4;
+    const passed = sections.filter((section) => section.getBoundingClientRect().top < innerHeight * 0.35);
+    const current = atEnd ? sections.at(-1) : passed.at(-1);
+    for (const [id, link] of links) {
+      if (id === current?.id) link.setAttribute("aria-current", "true");
+      else link.removeAttribute("aria-current");
     }
-  }, { rootMargin: "-30% 0px -65% 0px" });
-  for (const id of links.keys()) observer.observe(document.getElementById(id));
+  };
+  let waiting = false;
+  addEventListener("scroll", () => {
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(() => {
+      waiting = false;
+      mark();
+    });
+  }, { passive: true });
+  mark();
 }
 
 function start() {

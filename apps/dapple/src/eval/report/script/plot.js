@@ -71,9 +71,10 @@ function roundTicks(low, high, count) {
 
 /** Places of a logarithmic axis: 1, 2, 5, or finer where the range is short. */
 function logTicks(low, high, count) {
-  if (high / low < 4) return roundTicks(low, high, count).filter((tick) => tick >= low);
+  if (high / low < 2.5) return roundTicks(low, high, count).filter((tick) => tick >= low);
   const decades = Math.log10(high / low);
-  const steps = decades > count ? [1] : decades > count / 2 ? [1, 3] : [1, 2, 5];
+  const finer = [[1, 1.5, 2, 3, 4, 5, 6, 8], [1, 2, 3, 5], [1, 2, 5], [1, 3], [1]];
+  const steps = finer.find((list) => list.length * decades <= count) ?? [1];
   const ticks = [];
   for (let power = Math.floor(Math.log10(low)); power <= Math.ceil(Math.log10(high)); power += 1) {
     for (const step of steps) {
@@ -144,6 +145,8 @@ function keepApart(labels, lineHeight, top, bottom) {
 function withPen(plot, draw) {
   const pen = plot.ctx;
   pen.save();
+  // The library leaves the dashes of its last line behind.
+  pen.setLineDash([]);
   pen.font = FONT.replace(/\d+/, (size) => size * devicePixelRatio);
   pen.textBaseline = "middle";
   pen.textAlign = "left";

@@ -27,7 +27,7 @@ function qualityOf(caseIndex, metric, cost, grouping) {
     if (figure[0] === null) {
       equal.push(rowName(row));
     } else if (!price || price[0] === null) {
-      levels.push({ row, index, y: figure[0], ci95: figure[1], name: levelName(row) });
+      levels.push({ row, index, y: figure[0], ci95: figure[1], name: rowName(row) });
     } else {
       const others = Object.entries(row.params).filter(([key]) => key !== grouping);
       const key = JSON.stringify([row.method, others.sort()]);
@@ -38,12 +38,6 @@ function qualityOf(caseIndex, metric, cost, grouping) {
   });
   for (const line of lines.values()) line.points.sort((a, b) => a.x - b.x);
   return { lines: [...lines.values()], levels, equal };
-}
-
-/** A level needs no more than its method where that says it all, as `rtao-16` does. */
-function levelName(row) {
-  const [, rays] = row.setting.find(([key]) => key === "rays_per_pixel") ?? [];
-  return rays && row.method.endsWith(rays.split(" ")[0]) ? row.method : rowName(row);
 }
 
 /** Where nothing costs nothing: a place left of all else, since a logarithmic axis has none. */
@@ -134,7 +128,7 @@ function qualityPlot(place, caseIndex, small) {
     },
     cursor: { x: false, y: false },
   };
-  const plot = plotIn(place, options, values, (width) => (small ? 220 : Math.min(460, Math.max(260, width * 0.5))));
+  const plot = plotIn(place, options, values, (width) => Math.min(small ? 320 : 460, Math.max(small ? 220 : 260, width * 0.5)));
   plot.over.addEventListener("mouseleave", () => hint.hide());
   plot.over.addEventListener("click", () => {
     if (near) showInViewer({ case: caseIndex, a: TRUTH, b: near.point.index });
@@ -174,7 +168,9 @@ function rangeY(points, levels) {
 function extrasOf() {
   const extras = cases.flatMap((one) => one.rows.map((row) => settingOf(row, qualityState.grouping)));
   const streamed = cases.flatMap((one) => one.rows.map((row) => Boolean(row.figures[qualityState.cost])));
-  return [...new Set(extras.filter((_, i) => streamed[i]))];
+  const found = [...new Set(extras.filter((_, i) => streamed[i]))];
+  // The most points or the highest rate, which is what most look at, has a line without dashes.
+  return found.sort((a, b) => b.localeCompare(a, "en", { numeric: true }));
 }
 
 function lineLabel(line, lines) {
@@ -255,8 +251,10 @@ function drawQuality(plot, pen, { lines, on, off, labels, roomy, near, metric, n
   pen.restore();
   for (const line of lines) {
     pen.strokeStyle = pen.fillStyle = colorOf(line.method);
-    pen.lineWidth = 1.5 * scale;
+    pen.lineWidth = scale;
+    pen.globalAlpha = 0.75;
     for (const point of line.points) drawInterval(pen, point, x, y, scale);
+    pen.globalAlpha = 1;
     for (const point of line.points) {
       const mark = markPath(looks.get(line.method).mark, x(point.at), y(point.y), (near?.point === point ? 7 : 5) * scale);
       pen.lineWidth = 3 * scale;
@@ -265,7 +263,7 @@ function drawQuality(plot, pen, { lines, on, off, labels, roomy, near, metric, n
       pen.fill(mark);
     }
   }
-  if (roomy) drawLabels(pen, labels, { x, y, left, top, width, height, scale });
+  if (roomy) drawLabels(pen, labels, lines, { x, y, left, top, width, height, scale });
   drawOff(pen, off, metric, { left, top, height, scale, y });
 }
 
@@ -289,19 +287,47 @@ function drawInterval(pen, point, x, y, scale) {
   pen.stroke();
 }
 
-function drawLabels(pen, labels, { x, y, left, top, width, height, scale }) {
-  const placed = labels.map(({ line, level, words }) => {
-    const last = line?.points.at(-1);
-    return {
-      words,
-      x: last ? x(last.at) + 11 * scale : left + width + 6 * scale,
-      y: y(last ? last.y : level.y),
-      width: pen.measureText(words).width,
-      color: colorOf(line ? line.method : level.row.method),
-    };
-  });
-  keepApart(placed, 15 * scale, top + 6 * scale, top + height - 6 * scale);
-  for (const label of placed) writeClear(pen, label.words, label.x, label.y, label.color);
+/** Names of levels right of the plot, names of lines at their last points, where they hide least. */
+function drawLabels(pen, labels, lines, { x, y, left, top, width, height, scale }) {
+  const line = 15 * scale;
+  const levels = labels.filter(({ level }) => level).map(({ level, words }) => ({
+    words,
+    x: left + width + 6 * scale,
+    y: y(level.y),
+    width: pen.measureText(words).width,
+    color: colorOf(level.row.method),
+  }));
+  keepApart(levels, line, top, top + height);
+  // What labels should not hide: other labels, and lines, of which a point every few pixels is enough.
+  const taken = [...levels];
+  const dots = lines.flatMap(({ points }) => points.flatMap((point, i) => {
+    const [x0, y0] = [x(point.at), y(point.y)];
+    const next = points[i + 1];
+    const marks = [-8, 0, 8].map((d) => [x0 + d * scale, y0]);
+    if (!next) return marks;
+    const [x1, y1] = [x(next.at), y(next.y)];
+    const count = Math.ceil(Math.hypot(x1 - x0, y1 - y0) / (8 * scale));
+    return [...marks, ...[...Array(count)].map((_, k) => [x0 + ((x1 - x0) * k) / count, y0 + ((y1 - y0) * k) / count])];
+  }));
+  for (const { line: own, words } of labels.filter((label) => label.line)) {
+    const last = own.points.at(-1);
+    const size = pen.measureText(words).width;
+    const [px, py] = [x(last.at), y(last.y)];
+    const bar = last.xCi95 && last.x > 0 ? x((last.at * (last.x + last.xCi95)) / last.x) - px : 0;
+    const right = Math.max(9 * scale, bar) + 5 * scale;
+    const [near, up, down] = [8 * scale, -13 * scale, 14 * scale];
+    const sites = [[right, 0], [near, up], [near, down], [-size - right, 0], [-size - near, up], [-size - near, down]];
+    const candidates = sites.map(([dx, dy], i) => {
+      const label = { words, x: px + dx, y: py + dy, width: size, color: colorOf(own.method) };
+      const [from, to] = [label.x - 3 * scale, label.x + size + 3 * scale];
+      const hidden = dots.filter(([dotX, dotY]) => dotX > from && dotX < to && Math.abs(dotY - label.y) < line * 0.6);
+      const met = taken.filter((other) => other.x < to && from < other.x + other.width && Math.abs(other.y - label.y) < line);
+      const outside = label.x < left || label.y < top || label.y > top + height;
+      return { label, cost: i * 0.1 + hidden.length + 20 * met.length + (outside ? 50 : 0) };
+    });
+    taken.push(candidates.reduce((best, one) => (one.cost < best.cost ? one : best)).label);
+  }
+  for (const label of taken) writeClear(pen, label.words, label.x, label.y, label.color);
 }
 
 /** Levels that are too far away to be drawn are named at the edge they lie behind. */

@@ -24,31 +24,30 @@ const KNOWN = [
 ];
 const DASHES = [[], [7, 4], [2, 3], [9, 3, 2, 3]];
 
+/** Each method's colour and mark. Variants of one method, as `rtao-4` and `rtao-16` are, share a colour, not a mark. */
 const looks = (() => {
   const found = new Map();
-  const used = new Set();
-  const take = (wanted) => {
-    used.add(wanted);
-    return wanted;
-  };
   const methods = [...new Set(cases.flatMap((one) => one.rows.map((row) => row.method)))];
-  const exact = (method) => KNOWN.find(([pattern]) => pattern.test(method));
-  // Of several that would look alike the first keeps its look.
+  const knownOf = (method) => KNOWN.find(([pattern]) => pattern.test(method));
+  const marks = new Set(methods.map((method) => knownOf(method)?.[2]).filter(Boolean));
+  const taken = new Set();
+  const markFor = (wanted) => {
+    const mark = wanted && !taken.has(wanted) ? wanted : (MARKS.find((one) => !marks.has(one)) ?? MARKS[found.size % MARKS.length]);
+    marks.add(mark);
+    taken.add(mark);
+    return mark;
+  };
   for (const method of methods) {
-    const known = exact(method);
-    if (known && !used.has(known[1])) found.set(method, { color: take(known[1]), mark: known[2] });
+    const known = knownOf(method);
+    if (known) found.set(method, { color: known[1], mark: markFor(known[2]) });
   }
-  const marksUsed = new Set([...found.values()].map((look) => look.mark));
-  let extra = 0;
+  const free = Object.keys(SLOTS).filter((slot) => ![...found.values()].some((look) => look.color === slot));
   for (const method of methods) {
     if (found.has(method)) continue;
-    const color = Object.keys(SLOTS).find((slot) => !used.has(slot)) ?? Object.keys(SLOTS)[extra % 7];
-    const mark = MARKS.find((mark) => !marksUsed.has(mark)) ?? MARKS[(extra + 3) % MARKS.length];
-    marksUsed.add(mark);
-    found.set(method, { color: take(color), mark });
-    extra += 1;
+    const color = free.shift() ?? Object.keys(SLOTS)[found.size % Object.keys(SLOTS).length];
+    found.set(method, { color, mark: markFor() });
   }
-  return found;
+  return new Map(methods.map((method) => [method, found.get(method)]));
 })();
 
 const prefersDark = matchMedia("(prefers-color-scheme: dark)");

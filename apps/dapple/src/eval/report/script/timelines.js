@@ -14,11 +14,11 @@ function rowsShown(caseIndex) {
   return timeState.rows.get(caseIndex);
 }
 
-/** Dashes of a row: rows of one method share a colour. */
+/** Dashes of a row: those shown of one colour differ. */
 function dashOf(caseIndex, index) {
   const { rows } = cases[caseIndex];
-  const before = rows.slice(0, index).filter((row) => row.method === rows[index].method).length;
-  return DASHES[before % DASHES.length];
+  const before = [...rowsShown(caseIndex)].filter((other) => other < index && colorOf(rows[other].method) === colorOf(rows[index].method));
+  return DASHES[before.length % DASHES.length];
 }
 
 /** A row's bits: of each step, or of the second before it; times in seconds, values in kbit/s or bytes. */
@@ -59,12 +59,12 @@ function linesName(caseIndex, rows) {
 }
 
 /** A plot of lines that each have times of their own. */
-function linePlot(place, caseIndex, lines, { unit, digits, xUnit, xDigits, logX, zero, onPick, sync, mark }) {
+function linePlot(place, caseIndex, lines, { unit, digits, xUnit, xDigits, tall, rangeX, zero, onPick, sync, mark }) {
   const tables = lines.map((line) => [line.times, line.values]);
   const values = uPlot.join(tables, tables.map((table) => table.map(() => 1)));
   const few = values[0].length <= 80;
   const options = {
-    padding: [10, 14, 0, 0],
+    padding: [10, 26, 0, 0],
     cursor: {
       y: false,
       points: { show: true, size: 8 },
@@ -75,7 +75,7 @@ function linePlot(place, caseIndex, lines, { unit, digits, xUnit, xDigits, logX,
     },
     focus: { alpha: 0.3 },
     scales: {
-      x: logX ? { time: false, distr: 3 } : { time: false },
+      x: { time: false, ...(rangeX ? { range: () => rangeX } : {}) },
       y: { range: (_, low, high) => rangeOfLines(low, high, zero) },
     },
     axes: [
@@ -91,7 +91,7 @@ function linePlot(place, caseIndex, lines, { unit, digits, xUnit, xDigits, logX,
           width: 2,
           dash: dashOf(caseIndex, line.rows[0]),
           spanGaps: true,
-          points: { show: few, size: 6, fill: () => colorOf(row.method) },
+          points: { show: few, size: 5, fill: () => colorOf(row.method) },
         };
       }),
     ],
@@ -100,7 +100,7 @@ function linePlot(place, caseIndex, lines, { unit, digits, xUnit, xDigits, logX,
       setCursor: [(plot) => showValues(plot, lines, caseIndex, { unit, digits, xUnit, xDigits, onPick })],
     },
   };
-  const plot = plotIn(place, options, values, (width) => (width < LABEL_WIDTH ? 190 : 220));
+  const plot = plotIn(place, options, values, (width) => (tall ? 300 : width < LABEL_WIDTH ? 190 : 220));
   plot.over.addEventListener("mouseleave", () => hint.hide());
   if (onPick) {
     plot.over.classList.add("pick");
@@ -110,6 +110,11 @@ function linePlot(place, caseIndex, lines, { unit, digits, xUnit, xDigits, logX,
     });
   }
   return plot;
+}
+
+/** The whole path, so that plots below each other agree. */
+function wholePath(found) {
+  return [0, Math.max(found.seconds, ...found.time_s)];
 }
 
 function nearestFilled(list, index) {
@@ -167,10 +172,13 @@ function drawTimeSection() {
   const shown = [...rowsShown(caseIndex)].sort((a, b) => a - b);
   const place = document.getElementById("time-plots");
   place.replaceChildren();
-  const add = (title, content) => {
+  // What has the path's time below each other, what has a time of its own beside it.
+  const along = make("div", { className: "along" });
+  place.append(along);
+  const add = (title, content, beside = false) => {
     const inside = make("div", { className: "plot-place" });
     const figure = make("figure", { className: "plot" }, make("figcaption", {}, ...[title].flat()), inside);
-    place.append(figure);
+    (beside ? place : along).append(figure);
     if (typeof content === "string") inside.append(make("p", { className: "empty" }, content));
     else content(inside);
   };
@@ -194,7 +202,7 @@ function drawMetric(add, caseIndex, shown, column) {
   } else {
     add(title, (inside) => {
       const plot = linePlot(inside, caseIndex, lines, {
-        unit: column.unit, digits: column.digits, xUnit: "s", xDigits: 2, sync: "path",
+        unit: column.unit, digits: column.digits, xUnit: "s", xDigits: 2, rangeX: wholePath(found), sync: "path",
         mark: () => viewerTime(caseIndex),
         onPick: hasPictures(caseIndex) ? (time) => {
           const frame = found.time_s.indexOf(time);
@@ -222,7 +230,7 @@ function drawBits(add, caseIndex, shown) {
     add(title, "The path has one server step only: no line in time.");
   } else {
     add(title, (inside) => linePlot(inside, caseIndex, lines, {
-      unit: byStep ? "bytes" : "kbit/s", digits: byStep ? 0 : 1, xUnit: "s", xDigits: 2, zero: true, sync: "path",
+      unit: byStep ? "bytes" : "kbit/s", digits: byStep ? 0 : 1, xUnit: "s", xDigits: 2, rangeX: wholePath(found), zero: true, sync: "path",
       mark: () => viewerTime(caseIndex),
     }));
   }
@@ -231,15 +239,15 @@ function drawBits(add, caseIndex, shown) {
 function drawSettling(add, caseIndex, shown) {
   const found = cases[caseIndex];
   if (!found.rows.some((row) => row.settling)) return;
-  const title = "visibility, dB, after everything moved at once and then stood still";
+  const title = "visibility, dB, after a move of everything";
   const lines = shown
     .filter((index) => found.rows[index].settling)
     .map((index) => {
       const { after_s, visibility_psnr_db } = found.rows[index].settling;
       return { rows: [index], times: after_s.map((s) => s * 1000), values: visibility_psnr_db };
     });
-  if (!lines.length) add(title, "None of the rows shown was looked at after a move.");
-  else add(title, (inside) => linePlot(inside, caseIndex, lines, { unit: "dB", digits: 2, xUnit: "ms", xDigits: 0 }));
+  if (!lines.length) add(title, "None of the rows shown was looked at after a move.", true);
+  else add(title, (inside) => linePlot(inside, caseIndex, lines, { unit: "dB", digits: 2, xUnit: "ms", xDigits: 0, tall: true }), true);
 }
 
 function drawTimeLegend() {
@@ -250,8 +258,10 @@ function drawTimeLegend() {
     const button = make("button", { type: "button", "aria-pressed": String(shown.has(index)) }, swatch(row.method, dashOf(caseIndex, index)), rowName(row));
     button.addEventListener("click", () => {
       if (!shown.delete(index)) shown.add(index);
-      button.setAttribute("aria-pressed", String(shown.has(index)));
+      drawTimeLegend();
       drawTimeSection();
+      // The button is a new one, since dashes may have changed.
+      legend.children[index].focus();
     });
     return button;
   }));

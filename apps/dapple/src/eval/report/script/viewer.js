@@ -87,6 +87,7 @@ function renderViewer(before = null) {
   ui.b.field.value = String(show.b);
   ui.viewer.dataset.mode = show.mode;
   showFacts();
+  sizeStage();
   placeViews();
   if (differs("case", "frame") && timeState.plot) redrawPlots();
   rememberPlace();
@@ -201,7 +202,11 @@ function shownBy(index) {
 /** Names and figures over the pictures. */
 function showFacts() {
   const facts = (index) => {
-    if (index === TRUTH) return make("small", {}, show.view === shownBy(TRUTH) ? "" : shownBy(TRUTH) === "picture" ? "" : shownBy(TRUTH));
+    if (index === TRUTH) {
+      // Where the truth has no such picture, what it shows instead.
+      const view = VIEWS.find((one) => one.key === show.view);
+      return view.truth === view.key ? null : make("small", {}, `its ${shownBy(TRUTH)}`);
+    }
     const { frames } = cases[show.case].rows[index];
     const shown = qualityColumns.filter((column) => ["visibility_psnr_db", "flip"].includes(column.key) && frames[column.key]);
     const words = shown.map((column) => {
@@ -217,6 +222,20 @@ function showFacts() {
   } else {
     for (const one of ui.panes) one.caption.replaceChildren(...head(one.index).filter(Boolean));
   }
+}
+
+/**
+ * How wide two pictures on each other are: no larger than lets the whole viewer be seen, and a whole number of times
+ * their own size if that wastes little, so that all pixels are equally large.
+ */
+function sizeStage() {
+  const { width, height } = cases[show.case];
+  const controls = 335;
+  const room = ui.stage.parentElement.clientWidth;
+  const most = Math.min(room, (Math.max(320, innerHeight - controls) * width) / height);
+  const times = Math.floor((most * devicePixelRatio) / width);
+  const whole = (times * width) / devicePixelRatio;
+  ui.stage.style.width = show.mode === "slider" ? `${whole > 0.7 * most ? whole : most}px` : "";
 }
 
 /** Moves all pictures to the view, and the divider to its place. */
@@ -313,8 +332,8 @@ function startViewer() {
   }
   ui.viewer = place;
   const methods = (label, name) => select(label, [], "", (value) => change({ [name]: Number(value), flip: null }));
-  ui.a = methods("left (A)", "a");
-  ui.b = methods("right (B)", "b");
+  ui.a = methods("A", "a");
+  ui.b = methods("B", "b");
   const swap = button("⇄", "Swap A and B (X)", () => change({ a: show.b, b: show.a }), "icon");
   ui.views = segments("What is shown", VIEWS.map((view, i) => [view.key, view.title, `${view.title} (${i + 1})`]), show.view, (view) => change({ view }));
   ui.modes = segments("How it is shown", MODES, show.mode, (mode) => change({ mode, flip: null }));
@@ -331,10 +350,10 @@ function startViewer() {
     button("+", "Larger (+)", () => zoomBy(2)),
     button("Fit", "The whole picture (0)", fit),
   );
-  const full = button("⛶", "Full screen", () => {
+  const full = button("Full screen", "The viewer alone (Escape leaves)", () => {
     if (document.fullscreenElement) document.exitFullscreen();
     else place.requestFullscreen?.();
-  }, "icon");
+  });
   ui.divider = make("div", {
     className: "divider", role: "slider", tabIndex: 0, "aria-label": "Divider between A and B",
     "aria-valuemin": "0", "aria-valuemax": "100", "aria-orientation": "horizontal",
@@ -370,5 +389,10 @@ function startViewer() {
   recallPlace();
   startGestures();
   renderViewer();
-  new ResizeObserver(() => placeViews()).observe(ui.stage);
+  const resize = () => {
+    sizeStage();
+    placeViews();
+  };
+  new ResizeObserver(resize).observe(ui.stage.parentElement);
+  addEventListener("resize", resize);
 }
