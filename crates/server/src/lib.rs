@@ -12,7 +12,9 @@ use dapple_store::points::PointStore;
 use dapple_stream::{Frame, PublishError, Publisher, PublisherConfig};
 use dapple_trace::Tracer;
 use dapple_trace::psao::cuts::find_cuts;
-use dapple_trace::psao::generate::{GenerateError, GenerateParams, GeneratedPoints, generate_points};
+use dapple_trace::psao::generate::{
+    GenerateError, GenerateParams, GeneratedPoints, check_density, generate_points,
+};
 use dapple_trace::psao::update::{StepCounts, StepInput, UpdateError, UpdateParams, Updater};
 
 /// Settings of a server. Each group documents its own ranges and defaults.
@@ -27,6 +29,17 @@ pub struct ServerConfig {
     /// Whether rays find out which points must not count at which texels of a client's atlas, because something solid stands
     /// between them. Costs some seconds at the start and some bytes of each snapshot; light leaks less. Default true.
     pub cuts: bool,
+}
+
+impl ServerConfig {
+    /// Finds quickly whether a server of this scene would refuse these settings.
+    ///
+    /// # Errors
+    /// What [`Server::new`] would say.
+    pub fn check(&self, scene: &Scene) -> Result<(), ServerError> {
+        check_density(scene, &self.generate)?;
+        Ok(self.update.check()?)
+    }
 }
 
 impl Default for ServerConfig {

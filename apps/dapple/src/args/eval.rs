@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use clap::Args;
+use clap::{Args, Subcommand};
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 
@@ -22,7 +22,10 @@ The same command again continues where it was stopped, and a finished one only w
 results.csv, frames.csv, results.md, report.html and the pictures; docs/evaluation.md describes the columns.";
 
 #[derive(Debug, Clone, Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub(crate) struct EvalArgs {
+    #[command(subcommand)]
+    pub(crate) verb: Option<EvalVerb>,
     /// .gltf, .glb or .obj files [default: a small setting of the built-in atrium].
     #[arg(value_name = "SCENE")]
     pub(crate) scenes: Vec<PathBuf>,
@@ -62,6 +65,23 @@ pub(crate) struct EvalArgs {
     /// Threads; 0 is one for each core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) threads: usize,
+}
+
+/// What `dapple eval` does instead of evaluating.
+#[derive(Debug, Clone, Subcommand)]
+pub(crate) enum EvalVerb {
+    /// Write the report of results again, without tracing anything.
+    Report(ReportArgs),
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ReportArgs {
+    /// A results.json, beside the pictures that it names.
+    #[arg(value_name = "results.json")]
+    pub(crate) results: PathBuf,
+    /// The page to write [default: report.html beside the results].
+    #[arg(short, long, value_name = "FILE.html")]
+    pub(crate) output: Option<PathBuf>,
 }
 
 /// What can be chosen for each scene. A suite's file has the same names.

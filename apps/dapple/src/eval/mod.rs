@@ -26,9 +26,9 @@ mod work;
 
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 
-use crate::args::EvalArgs;
+use crate::args::{EvalArgs, EvalVerb};
 use crate::picture::write_file;
 
 use plan::Plan;
@@ -36,9 +36,12 @@ use results::Results;
 
 /// Runs an evaluation and writes results, report and pictures.
 pub(crate) fn run(args: &EvalArgs) -> Result<()> {
+    if let Some(verb) = &args.verb {
+        return match verb {
+            EvalVerb::Report(args) => report::rebuild(&args.results, args.output.as_deref()),
+        };
+    }
     let plan = Plan::new(args)?;
-    std::fs::create_dir_all(&args.out)
-        .with_context(|| format!("cannot create the folder {}", args.out.display()))?;
     let results = run::evaluate(&plan, args)?;
     say!("{}", table::text(&results));
     write(&results, &args.out)?;

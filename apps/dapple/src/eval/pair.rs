@@ -41,6 +41,20 @@ impl Start {
             seed: settings.seed,
         }
     }
+
+    fn config(&self) -> ServerConfig {
+        let generate = GenerateParams {
+            points_per_m2: self.points_per_m2,
+            seed: self.seed,
+            ..GenerateParams::default()
+        };
+        ServerConfig { generate, update: self.update, ..ServerConfig::default() }
+    }
+
+    /// Whether a server would refuse these settings; quick.
+    pub(super) fn check(&self, scene: &Scene) -> Result<()> {
+        Ok(self.config().check(scene)?)
+    }
 }
 
 /// Servers of one scene at time 0, which are the same for every rate and path.
@@ -73,16 +87,11 @@ impl Starts {
             return Ok(server.clone());
         }
         let scene = &loaded.scene;
-        let generate = GenerateParams {
-            points_per_m2: start.points_per_m2,
-            seed: start.seed,
-            ..GenerateParams::default()
-        };
-        let config = ServerConfig { generate, update: start.update, ..ServerConfig::default() };
+        let config = start.config();
         let part = |done: usize, of: usize| done as f64 / of.max(1) as f64;
         let instances = scene.instances.len();
         let laid = |done| progress(0.3 * part(done, instances));
-        let points = generate_points(scene, &self.rest_pose, &self.tracer, &generate, &laid)?;
+        let points = generate_points(scene, &self.rest_pose, &self.tracer, &config.generate, &laid)?;
         let server = Server::with_points(
             scene.clone(),
             self.rest_pose.clone(),

@@ -11,7 +11,7 @@ use super::advice;
 use super::figures::FrameError;
 use super::job::{Desk, Job, Outcome, jobs};
 use super::journal::Journal;
-use super::pair::Starts;
+use super::pair::{Start, Starts};
 use super::plan::{Entry, Plan};
 use super::results::{Advice, Case, Machine, Results, RunInfo, SCHEMA, SceneInfo, Truth, TruthFrame, commit};
 use super::stage::Stage;
@@ -77,7 +77,8 @@ pub(super) fn evaluate(plan: &Plan, args: &EvalArgs) -> Result<Results> {
     let advice = advice.collect();
     drop(run.work);
     if run.reused > 0 {
-        say!("{} jobs were done before and were not run again (--fresh runs all)", run.reused);
+        let jobs = if run.reused == 1 { "job" } else { "jobs" };
+        say!("{} {jobs} done before, not run again (--fresh runs all)", run.reused);
     }
     Ok(Results {
         schema: SCHEMA,
@@ -107,6 +108,9 @@ impl Run<'_> {
     fn entry(&mut self, entry: &Entry, plan: &Plan, cases: &mut Vec<Case>) -> Result<()> {
         self.work.message(&format!("loading {}", entry.name));
         let loaded = source::load(&entry.scene, None)?;
+        // Only now, so that a scene that cannot be used leaves nothing behind.
+        std::fs::create_dir_all(self.out)
+            .with_context(|| format!("cannot create the folder {}", self.out.display()))?;
         let radius = source::radius_of(&loaded.scene, entry.settings.radius)?;
         let mut starts = Starts::new(&loaded.scene);
         self.judges.hdr_flip = entry.settings.hdr_flip;
@@ -115,6 +119,13 @@ impl Run<'_> {
             .into_iter()
             .map(|path| Stage::new(&loaded, &entry.settings, path, radius, starts.tracer().clone()))
             .collect();
+        if let Some(stage) = stages.first()
+            && entry.settings.methods.iter().any(|m| m.uses_points())
+        {
+            for &points_per_m2 in &entry.settings.points_per_m2 {
+                Start::new(stage, points_per_m2).check(&loaded.scene)?;
+            }
+        }
         self.one_case = plan.entries.len() == 1 && stages.len() == 1;
         // Other scenes are taken to be as much work as this one, until they are loaded.
         let work: f64 = stages.iter().map(|stage| stage.truth_work() + job_work(stage)).sum();

@@ -1,7 +1,7 @@
 //! How far a run is and how long it will still take: a bar on a terminal, a line a job elsewhere.
 
 use std::io::IsTerminal;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use crate::progress::Bar;
 
@@ -78,22 +78,27 @@ impl Work {
         if self.lines && fresh {
             let elapsed = self.begun.elapsed();
             let left = if self.left > 0.0 {
-                format!(", about {} left", minutes(elapsed.mul_f64(self.left / self.done.max(1.0))))
+                format!(", about {} left", minutes(elapsed.as_secs_f64() * self.left / self.done.max(1.0)))
             } else {
                 String::new()
             };
-            eprintln!("{} of {}: {what}, after {}{left}", self.finished, self.count(), minutes(elapsed));
+            eprintln!(
+                "{} of {}: {what}, after {}{left}",
+                self.finished,
+                self.count(),
+                minutes(elapsed.as_secs_f64())
+            );
         }
     }
 }
 
-/// A time as people say it.
-fn minutes(time: Duration) -> String {
-    let seconds = time.as_secs();
+/// A time in seconds as people say it.
+fn minutes(seconds: f64) -> String {
     match seconds {
-        0..90 => format!("{seconds} s"),
-        90..5400 => format!("{} min", (seconds + 30) / 60),
-        _ => format!("{:.1} h", seconds as f64 / 3600.0),
+        ..89.5 => format!("{seconds:.0} s"),
+        ..5400.0 => format!("{:.0} min", seconds / 60.0),
+        ..172_800.0 => format!("{:.1} h", seconds / 3600.0),
+        _ => format!("{:.0} days", seconds / 86_400.0),
     }
 }
 
@@ -103,7 +108,9 @@ mod tests {
 
     #[test]
     fn times_are_said_in_the_unit_that_fits() {
-        let said = |s| minutes(Duration::from_secs(s));
-        assert_eq!([said(5), said(100), said(5399), said(9000)], ["5 s", "2 min", "90 min", "2.5 h"]);
+        let times = [5.2, 100.0, 5399.0, 9000.0, 864_000.0, 1e300];
+        let said = times.map(minutes);
+        assert_eq!(said[..5], ["5 s", "2 min", "90 min", "2.5 h", "10 days"]);
+        assert!(said[5].ends_with(" days"));
     }
 }

@@ -90,6 +90,30 @@ pub enum GenerateError {
     Layout(#[from] LayoutError),
 }
 
+/// Finds quickly whether [`generate_points`] would refuse the parameters on this scene.
+///
+/// # Errors
+/// The density is no number above 0, or would give too many points.
+pub fn check_density(scene: &Scene, params: &GenerateParams) -> Result<(), GenerateError> {
+    measure(scene, params).map(|_| ())
+}
+
+fn measure(scene: &Scene, params: &GenerateParams) -> Result<Vec<SurfaceArea>, GenerateError> {
+    let density = params.points_per_m2;
+    if !(density.is_finite() && density > 0.0) {
+        return Err(GenerateError::BadDensity(density));
+    }
+    let areas: Vec<SurfaceArea> =
+        (0..scene.instances.len()).into_par_iter().map(|i| SurfaceArea::measure(scene, i)).collect();
+    let area_m2: f64 = areas.iter().map(|a| a.total).sum();
+    let limit = params.max_points.min(MAX_POINTS);
+    let points = (0.5 * area_m2 * f64::from(density)) as u64;
+    if points > u64::from(limit) {
+        return Err(GenerateError::TooManyPoints { points_per_m2: density, area_m2, points, limit });
+    }
+    Ok(areas)
+}
+
 /// Lays points on all instances that receive visibility.
 ///
 /// `pose` must be the scene at time 0 and `tracer` built for it. Runs in the caller's rayon pool; the result does not
@@ -101,20 +125,8 @@ pub fn generate_points(
     params: &GenerateParams,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<GeneratedPoints, GenerateError> {
+    let areas = measure(scene, params)?;
     let density = params.points_per_m2;
-    if !(density.is_finite() && density > 0.0) {
-        return Err(GenerateError::BadDensity(density));
-    }
-    let areas: Vec<SurfaceArea> =
-        (0..scene.instances.len()).into_par_iter().map(|i| SurfaceArea::measure(scene, i)).collect();
-    let area_m2: f64 = areas.iter().map(|a| a.total).sum();
-    let limit = params.max_points.min(MAX_POINTS);
-    let expected = (0.5 * area_m2 * f64::from(density)) as u64;
-    if expected > u64::from(limit) {
-        let points = expected;
-        return Err(GenerateError::TooManyPoints { points_per_m2: density, area_m2, points, limit });
-    }
-
     let r_max = maximum_radius(1.0, 0.5 * f64::from(density)) as f32;
     let spacing_m = 2.0 * r_max;
     let sides = Sides::new(scene);

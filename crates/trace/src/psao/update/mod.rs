@@ -53,7 +53,11 @@ impl Default for UpdateParams {
 }
 
 impl UpdateParams {
-    fn check(&self) -> Result<(), UpdateError> {
+    /// Finds whether the parameters lie in their ranges.
+    ///
+    /// # Errors
+    /// The first one that does not.
+    pub fn check(&self) -> Result<(), UpdateError> {
         let UpdateParams { rays, rays_still, radius_m, .. } = *self;
         if !(1..=256).contains(&rays) {
             return Err(UpdateError::BadRays(rays));
