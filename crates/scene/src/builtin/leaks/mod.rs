@@ -52,6 +52,7 @@ fn build(b: &mut GlbBuilder, palette: &Palette, detail: Detail) {
         ("books", partitions::books(detail)),
         ("closet", partitions::closet(detail)),
         ("onyx", partitions::onyx(detail)),
+        ("pictures", partitions::pictures(detail)),
         ("screen", partitions::screen(detail)),
         ("cabinet", partitions::cabinet(detail)),
     ] {

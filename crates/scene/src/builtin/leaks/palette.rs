@@ -137,10 +137,10 @@ fn board_height(_: u32, y: u32) -> f32 {
 /// Honey-coloured stone with pale and dark veins.
 fn onyx() -> Vec<u8> {
     paint(|x, y| {
-        let flow = tiling(221, x, y, [3.0, 5.0], 5);
-        let vein = libm::powf((1.0 - (3.0 * flow).abs()).max(0.0), 3.0);
+        let flow = tiling(221, x, y, [2.0, 4.0], 5);
+        let vein = libm::powf((1.0 - (3.5 * flow).abs()).max(0.0), 4.0);
         let cloud = tiling(223, x, y, [5.0, 4.0], 4);
-        let deep = libm::powf((1.0 - (4.0 * (cloud - 0.2)).abs()).max(0.0), 4.0);
+        let deep = libm::powf((1.0 - (5.0 * (cloud - 0.2)).abs()).max(0.0), 6.0);
         let color = Vec3::new(0.70, 0.45, 0.20) * (1.0 + 0.35 * cloud) + Vec3::new(0.24, 0.30, 0.30) * vein
             - Vec3::new(0.34, 0.27, 0.12) * deep;
         [color.x, color.y, color.z, 1.0]

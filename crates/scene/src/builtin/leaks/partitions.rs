@@ -126,12 +126,27 @@ pub(super) fn onyx(detail: Detail) -> Things {
     k
 }
 
+/// Canvases 2 cm thick on the north and east walls, half a centimetre off.
+pub(super) fn pictures(detail: Detail) -> Things {
+    let mut k: Things = Kit::new(detail);
+    let ([x, z], gap, thick) = (HALL, SHEET, 2.0 * HALF);
+    for (of, from, to) in
+        [(Ink, [3.2, 1.1], [4.3, 2.7]), (Coral, [4.7, 1.1], [5.3, 1.7]), (Mustard, [4.7, 1.9], [5.3, 2.7])]
+    {
+        k.plain(of, [from[0], from[1], -z + gap], [to[0], to[1], -z + gap + thick]);
+    }
+    for (of, from, to) in [(Teal, [-3.9, 0.9], [-2.3, 2.3]), (Linen, [-1.9, 0.9], [-0.9, 2.3])] {
+        k.plain(of, [x - gap - thick, from[1], from[0]], [x - gap, to[1], to[0]]);
+    }
+    k
+}
+
 /// A screen of six sheets of 5 mm that stand in a zigzag, edge to edge.
 pub(super) fn screen(detail: Detail) -> Things {
     let mut k: Things = Kit::new(detail);
     let (width, fold) = (0.62, 0.5);
     let sheet = cuboid(Vec3::new(0.0, 0.0, -0.5 * SHEET), Vec3::new(width, 1.75, 0.5 * SHEET));
-    let mut at = Vec3::new(-0.3, 0.0, 4.7);
+    let mut at = Vec3::new(-3.1, 0.0, 5.05);
     for i in 0..6 {
         let turn = rotation_y(if i % 2 == 0 { fold } else { -fold });
         k.add(Rust, &sheet, &Affine3A::from_rotation_translation(turn, at));

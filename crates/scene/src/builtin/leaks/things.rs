@@ -84,15 +84,24 @@ pub(super) fn seats(detail: Detail) -> Things {
     let mut k: Things = Kit::new(detail);
     let pile = 0.008;
     k.plain(Carpet, [-6.7, 0.0, 1.7], [-3.2, pile, 4.3]);
-    let bench = |k: &mut Things, [x0, x1]: [f32; 2], [z0, z1]: [f32; 2], y: f32, of: Stuff| {
+    let bench = |k: &mut Things, [x0, x1]: [f32; 2], [z0, z1]: [f32; 2], [foot, y]: [f32; 2], of: Stuff| {
         k.plain(of, [x0, y - SHEET, z0], [x1, y, z1]);
         for x in [x0, x1 - SHEET] {
-            k.plain(of, [x, pile, z0], [x + SHEET, y - SHEET, z1]);
+            k.plain(of, [x, foot, z0], [x + SHEET, y - SHEET, z1]);
         }
     };
-    bench(&mut k, [-6.3, -4.3], [1.85, 2.35], 0.42, DarkSteel);
-    bench(&mut k, [-5.9, -4.5], [2.9, 3.5], 0.30, Rust);
-    bench(&mut k, [-3.95, -3.45], [2.4, 3.6], 0.42, DarkSteel);
+    bench(&mut k, [-6.3, -4.3], [1.85, 2.35], [pile, 0.42], DarkSteel);
+    bench(&mut k, [-5.9, -4.5], [2.9, 3.5], [pile, 0.30], Rust);
+    bench(&mut k, [-3.95, -3.45], [2.4, 3.6], [pile, 0.42], DarkSteel);
+    // One more along the other face of the bookcase's partition, and a board over it, both against it.
+    let face = BOOKCASE[0] + HALF;
+    bench(&mut k, [-6.7, -4.3], [face, face + 0.4], [0.0, 0.42], Rust);
+    k.plain(Oak, [-6.7, 1.3, face], [-4.3, 1.3 + BOARD, face + 0.2]);
+    for (i, of) in [Chalk, Teal, Mustard].into_iter().enumerate() {
+        let x = -6.2 + 0.62 * i as f32;
+        let vase = [[0.05, 0.0], [0.075, 0.05], [0.08, 0.12], [0.035, 0.2], [0.03, 0.25], [0.04, 0.27]];
+        k.round(of, p(x, 1.3 + BOARD, face + 0.1), &vase, 28);
+    }
     // Cushions lie flat on the seats and against each other.
     k.plain(Mustard, [-6.3, 0.42, 1.85], [-5.63, 0.5, 2.35]);
     k.plain(Linen, [-5.63, 0.42, 1.85], [-4.96, 0.5, 2.35]);
