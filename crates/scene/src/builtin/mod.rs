@@ -8,8 +8,10 @@
 
 mod atrium;
 pub mod builder;
+mod cornell;
 mod kit;
 mod lab;
+mod leaks;
 pub mod noise;
 mod paint;
 pub mod path;
@@ -43,6 +45,16 @@ pub const BUILTINS: &[Builtin] = &[
         name: "lab",
         summary: "A laboratory with machines, benches, pipes and a platform, through which 23 skinned people walk \
                   (15 s; camera paths path-aisle and path-crane).",
+    },
+    Builtin {
+        name: "cornell",
+        summary: "The Cornell box, in which a block turns and a cube slides, and beside it stages whose visibility has a closed form \
+                  (15 s; camera paths path-box and path-stages).",
+    },
+    Builtin {
+        name: "leaks",
+        summary: "A gallery of thin partitions, shelves, sheets of steel, curtains and volumes that touch, on which wrong light \
+                  shows (15 s; camera paths path-visit and path-close).",
     },
 ];
 
@@ -88,6 +100,8 @@ pub fn glb(name: &str, detail: f32) -> Result<Vec<u8>, BuiltinError> {
         "atrium" => atrium::glb(Detail(detail)),
         "station" => station::glb(Detail(detail)),
         "lab" => lab::glb(Detail(detail)),
+        "cornell" => cornell::glb(Detail(detail)),
+        "leaks" => leaks::glb(Detail(detail)),
         _ => Err(BuiltinError::Unknown {
             name: name.into(),
             known: BUILTINS.iter().map(|b| b.name).collect::<Vec<_>>().join(", "),

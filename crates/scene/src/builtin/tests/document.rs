@@ -3,9 +3,15 @@
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Quat, Vec3};
 
-use crate::builtin::glb;
+use crate::builtin::path::Flight;
+use crate::builtin::{glb, path};
+use crate::{Aabb, ChannelTarget, Pose, Scene};
+
+/// Length of every animation, seconds, and frames of every camera path.
+const SECONDS: f32 = 15.0;
+const FRAMES: u32 = 900;
 
 /// A built-in scene as its file says it.
 pub(in crate::builtin) struct Doc {
@@ -146,5 +152,86 @@ pub(in crate::builtin) fn assert_normals_agree(doc: &Doc) {
                 assert!(face.dot(n[a] + n[b] + n[c]) > 0.0, "{name:?}: a normal points inward at {}", p[a]);
             }
         }
+    }
+}
+
+/// Checks a scene's only animation: as long as it should be, with its moving parts, and cameras with a key every frame.
+pub(in crate::builtin) fn assert_motion(scene: &Scene, name: &str, moving: &[&str], paths: &[&str; 2]) {
+    assert_eq!(scene.animations.len(), 1);
+    let animation = &scene.animations[0];
+    assert_eq!((animation.name.as_str(), animation.duration()), (name, SECONDS));
+    let keys = |name: &str| -> Vec<usize> {
+        let node = scene.nodes.iter().position(|n| n.name == name).expect(name) as u32;
+        animation.channels.iter().filter(|c| c.node == node).map(|c| c.times.len()).collect()
+    };
+    for name in moving {
+        assert!(keys(name).iter().all(|&count| count > 2) && !keys(name).is_empty(), "{name} does not move");
+    }
+    for name in paths {
+        assert_eq!(keys(name), [FRAMES as usize + 1; 2], "{name}");
+    }
+    let animated: std::collections::BTreeSet<u32> = animation.channels.iter().map(|c| c.node).collect();
+    assert_eq!(animated.len(), moving.len() + paths.len(), "something else moves");
+    let found: Vec<String> = scene.camera_paths().into_iter().map(|path| path.name).collect();
+    assert_eq!(found, [paths[0], paths[1], "orbit"]);
+    // At most an eighth of a turn from key to key, so that what is between them is what is meant.
+    for channel in animation.channels.iter().filter(|c| c.target == ChannelTarget::Rotation) {
+        let keys: Vec<Quat> = channel.values.chunks_exact(4).map(Quat::from_slice).collect();
+        let name = &scene.nodes[channel.node as usize].name;
+        assert!(keys.windows(2).all(|pair| pair[0].dot(pair[1]) > 0.92), "{name} turns the long way");
+    }
+}
+
+/// Checks that cameras on their flights stay `clearance_m` away from every triangle of a rigid scene, moving ones
+/// included, and turn slowly.
+pub(in crate::builtin) fn assert_cameras_keep_clear(
+    scene: &Scene,
+    flights: &[(&str, Flight)],
+    clearance_m: f32,
+) {
+    let at = |i: usize, pose: &Pose| -> Vec<[Vec3; 3]> {
+        let (mesh, world) =
+            (&scene.meshes[scene.instances[i].mesh as usize], pose.instances[i].world_from_mesh);
+        let place = |v: u32| world.transform_point3(mesh.positions[v as usize]);
+        mesh.triangles.iter().map(|t| t.map(place)).collect()
+    };
+    let poses: Vec<Pose> = (0..=FRAMES).map(|k| scene.pose(f64::from(k) / 60.0)).collect();
+    let place = |i: usize, pose: &Pose| pose.instances[i].world_from_mesh;
+    let moves = |i: usize| poses.iter().any(|pose| place(i, pose) != place(i, &poses[0]));
+    let (movers, still): (Vec<usize>, Vec<usize>) = (0..scene.instances.len()).partition(|&i| moves(i));
+    let still: Vec<([Vec3; 3], Aabb)> =
+        still.iter().flat_map(|&i| at(i, &poses[0])).map(|t| (t, Aabb::from_points(t))).collect();
+    for (name, (eye, look)) in flights {
+        let (positions, rotations) = path::fly(eye, look, FRAMES);
+        assert_eq!(positions.len(), FRAMES as usize + 1);
+        let mut nearest = (f32::INFINITY, 0);
+        for (frame, &p) in positions.iter().enumerate() {
+            let mut look_at = |t: &[Vec3; 3], b: &Aabb| {
+                if b.distance_squared(p) < nearest.0 * nearest.0 {
+                    let d = point_triangle_distance(p, *t);
+                    if d < nearest.0 {
+                        nearest = (d, frame);
+                    }
+                }
+            };
+            still.iter().for_each(|(t, b)| look_at(t, b));
+            for &i in &movers {
+                if scene.instance_bounds_world(&poses[frame], i).distance_squared(p) < 1.0 {
+                    at(i, &poses[frame]).iter().for_each(|t| look_at(t, &Aabb::from_points(*t)));
+                }
+            }
+        }
+        let turns = rotations.windows(2).map(|q| 2.0 * (q[1] - q[0]).length());
+        let (frame, turn) =
+            turns.enumerate().fold((0, 0.0_f32), |most, next| if next.1 > most.1 { next } else { most });
+        let degrees = turn.to_degrees() * 60.0;
+        let speed = positions.windows(2).map(|w| w[0].distance(w[1])).sum::<f32>() / SECONDS;
+        eprintln!(
+            "{name}: {speed:.2} m/s, {:.2} m from things (frame {}), turns {degrees:.1}°/s (frame {frame})",
+            nearest.0, nearest.1
+        );
+        let (distance, near_frame) = nearest;
+        assert!(distance >= clearance_m, "{name}: frame {near_frame} is {distance} m from things");
+        assert!(degrees < 90.0, "{name}: turns too fast in frame {frame}");
     }
 }
