@@ -1,5 +1,6 @@
 //! Command-line arguments.
 
+mod verbs;
 mod view;
 mod watch;
 
@@ -9,6 +10,7 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
 
+pub(crate) use verbs::{CompareArgs, DiffArgs, ErrorMap, EvalVerb, JudgeArgs};
 pub(crate) use view::{Preset, ViewArgs, ViewKind};
 pub(crate) use watch::{DemoArgs, InspectArgs, LightArgs, RecordArgs};
 
@@ -125,7 +127,10 @@ pub(crate) struct StepArgs {
 }
 
 #[derive(Debug, Clone, Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub(crate) struct EvalArgs {
+    #[command(subcommand)]
+    pub(crate) verb: Option<EvalVerb>,
     #[command(flatten)]
     pub(crate) scene: SceneChoice,
     /// Methods to compare: psao, psao-hat (the paper's kernel on the same points; psao-hat-1.5: with 1.5 times its

@@ -9,6 +9,7 @@ mod settings;
 mod smoke;
 mod table;
 mod thin;
+mod verbs;
 
 use anyhow::Result;
 
@@ -20,6 +21,9 @@ use settings::Settings;
 
 /// Runs an evaluation and writes results, report and pictures.
 pub(crate) fn run(args: &EvalArgs) -> Result<()> {
+    if let Some(verb) = &args.verb {
+        return verbs::run(verb);
+    }
     let loaded = source::load(&args.scene, Some(settings::DEFAULT_SCENE))?;
     let settings = Settings::new(args, &loaded)?;
     std::fs::create_dir_all(&args.out)
