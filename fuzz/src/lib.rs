@@ -10,6 +10,7 @@ mod recording;
 mod scene;
 mod session;
 mod soup;
+mod weights;
 
 pub use frame::decode_frame;
 pub use input::Random;
@@ -17,15 +18,17 @@ pub use recording::read_recording;
 pub use scene::load_scene;
 pub use session::session_ops;
 pub use soup::triangle_soup;
+pub use weights::read_weights;
 
 /// A target: its name, which is that of its folder in `corpus/`, and its body.
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 5] = [
+pub const TARGETS: [Target; 6] = [
     ("decode_frame", decode_frame),
     ("session_ops", session_ops),
     ("read_recording", read_recording),
     ("load_scene", load_scene),
     ("triangle_soup", triangle_soup),
+    ("read_weights", read_weights),
 ];

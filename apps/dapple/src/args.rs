@@ -1,6 +1,7 @@
 //! Command-line arguments.
 
 mod eval;
+mod verbs;
 mod view;
 mod watch;
 
@@ -10,7 +11,8 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
 
-pub(crate) use eval::{EvalArgs, EvalVerb, Options};
+pub(crate) use eval::{EvalArgs, Options};
+pub(crate) use verbs::{CompareArgs, DiffArgs, ErrorMap, EvalVerb, JudgeArgs};
 pub(crate) use view::{Preset, ViewArgs, ViewKind};
 pub(crate) use watch::{DemoArgs, InspectArgs, LightArgs, RecordArgs};
 
@@ -26,7 +28,7 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Run server and client along a camera path and compare the pictures with ray-traced truth.
     #[command(after_help = eval::EVAL_EXAMPLES)]
-    Eval(EvalArgs),
+    Eval(Box<EvalArgs>),
     /// Render one picture of a scene.
     #[command(after_help = RENDER_EXAMPLES)]
     Render(RenderArgs),

@@ -7,6 +7,7 @@ mod args;
 mod demo;
 mod eval;
 mod inspect;
+mod judge;
 mod light;
 mod page;
 mod picture;

@@ -5,14 +5,14 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use dapple_client::Drawn;
-use dapple_metrics::{
-    Lpips, MetricError, PIXELS_PER_DEGREE, flip, flip_hdr, magma_srgb8, psnr, psnr_masked, ssim,
-};
+use dapple_metrics::{MetricError, flip, flip_hdr, magma_srgb8, psnr, psnr_masked, ssim};
 use dapple_render::compose::{ErrorKind, ResolvedPlane, resolve_plane, view_error, view_visibility};
 use dapple_render::image::{Rgb8Image, ToneMap};
 use dapple_scene::Scene;
 use dapple_scene::glam::Vec3;
 use dapple_trace::rtao::Site;
+
+use crate::judge::Judge;
 
 /// Writes a whole file: into a neighbour first, then renamed over the old one.
 pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
@@ -129,13 +129,6 @@ impl Shown {
     }
 }
 
-/// What is computed beside PSNR, SSIM and FLIP.
-#[derive(Default)]
-pub(crate) struct Judges {
-    pub(crate) lpips: Option<Lpips>,
-    pub(crate) hdr_flip: bool,
-}
-
 /// One picture against the truth.
 pub(crate) struct Compared {
     /// PSNR of visibility over the pixels that show geometry; `None` if none does, infinite if equal.
@@ -157,7 +150,7 @@ pub(crate) struct Maps {
 }
 
 impl Compared {
-    pub(crate) fn new(truth: &Shown, test: &Shown, judges: &Judges) -> Result<Compared> {
+    pub(crate) fn new(truth: &Shown, test: &Shown, judge: &Judge, hdr_flip: bool) -> Result<Compared> {
         let (width, height) = (truth.width, truth.height);
         let (truth_v, test_v) = (&truth.visibility.values, &test.visibility.values);
         let visibility_psnr_db = match truth.covered_pixels {
@@ -166,18 +159,19 @@ impl Compared {
         };
         let [truth_rgb, test_rgb] = [&truth.beauty, &test.beauty].map(|p| p.as_flattened());
         let unit = |bytes: &[u8]| bytes.iter().map(|&b| f32::from(b) / 255.0).collect::<Vec<f32>>();
-        let flip = flip(width, height, truth_rgb, test_rgb, PIXELS_PER_DEGREE)?;
+        let ppd = judge.pixels_per_degree;
+        let flip = flip(width, height, truth_rgb, test_rgb, ppd)?;
         let linear = |shown: &Shown| shown.radiance.iter().flat_map(|p| p.to_array()).collect::<Vec<f32>>();
-        let hdr_flip = match judges.hdr_flip {
+        let hdr_flip = match hdr_flip {
             false => None,
-            true => match flip_hdr(width, height, &linear(truth), &linear(test), PIXELS_PER_DEGREE, None) {
+            true => match flip_hdr(width, height, &linear(truth), &linear(test), ppd, None) {
                 Ok(found) => Some(found.mean),
                 // A black picture has no exposures.
                 Err(MetricError::Black) => None,
                 Err(error) => return Err(error.into()),
             },
         };
-        let lpips = judges.lpips.as_ref().map(|lpips| lpips.distance(width, height, truth_rgb, test_rgb));
+        let lpips = judge.lpips.as_ref().map(|lpips| lpips.distance(width, height, truth_rgb, test_rgb));
         Ok(Compared {
             visibility_psnr_db,
             psnr_db: psnr(&unit(truth_rgb), &unit(test_rgb), 1.0)?,

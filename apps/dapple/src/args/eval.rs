@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use clap::{Args, Subcommand};
+use clap::Args;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 
-use super::{Method, Radius, Size};
+use super::{EvalVerb, JudgeArgs, Method, Radius, Size};
 
 pub(super) const EVAL_EXAMPLES: &str = "\
 Examples:
@@ -40,9 +40,8 @@ pub(crate) struct EvalArgs {
     pub(crate) scenes_folder: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) options: Options,
-    /// Weights for LPIPS (SqueezeNet), a .safetensors file; without them it is not computed.
-    #[arg(long, value_name = "FILE", env = "DAPPLE_LPIPS_WEIGHTS")]
-    pub(crate) lpips_weights: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) judge: JudgeArgs,
     /// Folder for results, report, pictures, and what is needed to continue.
     #[arg(long, value_name = "DIR", default_value = "out/eval")]
     pub(crate) out: PathBuf,
@@ -65,23 +64,6 @@ pub(crate) struct EvalArgs {
     /// Threads; 0 is one for each core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) threads: usize,
-}
-
-/// What `dapple eval` does instead of evaluating.
-#[derive(Debug, Clone, Subcommand)]
-pub(crate) enum EvalVerb {
-    /// Write the report of results again, without tracing anything.
-    Report(ReportArgs),
-}
-
-#[derive(Debug, Clone, Args)]
-pub(crate) struct ReportArgs {
-    /// A results.json, beside the pictures that it names.
-    #[arg(value_name = "results.json")]
-    pub(crate) results: PathBuf,
-    /// The page to write [default: report.html beside the results].
-    #[arg(short, long, value_name = "FILE.html")]
-    pub(crate) output: Option<PathBuf>,
 }
 
 /// What can be chosen for each scene. A suite's file has the same names.

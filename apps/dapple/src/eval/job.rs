@@ -16,7 +16,8 @@ use super::settle::settle;
 use super::stage::{Frame, Stage};
 use super::truth::Cache;
 use crate::args::Method;
-use crate::picture::{Compared, Judges, Shown, sites};
+use crate::judge::Judge;
+use crate::picture::{Compared, Shown, sites};
 
 /// What is run together.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,7 +47,7 @@ pub(super) struct Desk<'a> {
     pub(super) out: &'a std::path::Path,
     /// Relative to `out`.
     pub(super) folder: String,
-    pub(super) judges: &'a Judges,
+    pub(super) judge: &'a Judge,
     pub(super) cache: &'a Cache,
     pub(super) truth: &'a Truth,
     /// Name of the recording to make.
@@ -225,7 +226,7 @@ impl Line {
     ) -> Result<()> {
         let visibility = self.look(stage, pair, &frame.drawn);
         let shown = Shown::new(&frame.drawn, visibility.as_deref())?;
-        let compared = Compared::new(&frame.truth, &shown, desk.judges)?;
+        let compared = Compared::new(&frame.truth, &shown, desk.judge, stage.settings.hdr_flip)?;
         let stem = format!("{}/{number:03}-{}", desk.folder, self.method);
         let files = shown.write(desk.out, &stem)?;
         let maps = compared.write(desk.out, &stem)?;

@@ -22,13 +22,14 @@ mod still;
 mod table;
 mod thin;
 mod truth;
+mod verbs;
 mod work;
 
 use std::path::Path;
 
 use anyhow::Result;
 
-use crate::args::{EvalArgs, EvalVerb};
+use crate::args::EvalArgs;
 use crate::picture::write_file;
 
 use plan::Plan;
@@ -37,9 +38,7 @@ use results::Results;
 /// Runs an evaluation and writes results, report and pictures.
 pub(crate) fn run(args: &EvalArgs) -> Result<()> {
     if let Some(verb) = &args.verb {
-        return match verb {
-            EvalVerb::Report(args) => report::rebuild(&args.results, args.output.as_deref()),
-        };
+        return verbs::run(verb);
     }
     let plan = Plan::new(args)?;
     let results = run::evaluate(&plan, args)?;

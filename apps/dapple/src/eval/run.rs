@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use dapple_metrics::Lpips;
 use dapple_scene::{CameraPath, CameraSource};
 use serde_json::json;
 
@@ -18,20 +17,16 @@ use super::stage::Stage;
 use super::truth::Cache;
 use super::work::Work;
 use crate::args::EvalArgs;
-use crate::picture::{Judges, write_file};
-use crate::source::{self, Loaded, read_limited};
-
-/// The largest file of weights that is read.
-const MAX_WEIGHTS_BYTES: u64 = 256 << 20;
+use crate::judge::Judge;
+use crate::picture::write_file;
+use crate::source::{self, Loaded};
 
 /// What all cases of a run share.
 struct Run<'a> {
     out: &'a Path,
     journal: Journal,
     cache: Cache,
-    judges: Judges,
-    /// Of the weights for LPIPS.
-    weights_hash: Option<String>,
+    judge: Judge,
     record: Option<&'a Path>,
     /// Whether there is one scene along one path.
     one_case: bool,
@@ -41,15 +36,7 @@ struct Run<'a> {
 }
 
 pub(super) fn evaluate(plan: &Plan, args: &EvalArgs) -> Result<Results> {
-    let (lpips, weights_hash) = match &args.lpips_weights {
-        None => (None, None),
-        Some(path) => {
-            let bytes = read_limited(path, MAX_WEIGHTS_BYTES)
-                .with_context(|| format!("cannot read the weights {}", path.display()))?;
-            let lpips = Lpips::from_safetensors(&bytes).with_context(|| path.display().to_string())?;
-            (Some(lpips), Some(blake3::hash(&bytes).to_hex()[..16].to_owned()))
-        }
-    };
+    let judge = Judge::new(&args.judge)?;
     if let Some(record) = &args.record
         && !record.extension().is_some_and(|e| e.eq_ignore_ascii_case("dapple"))
     {
@@ -60,8 +47,7 @@ pub(super) fn evaluate(plan: &Plan, args: &EvalArgs) -> Result<Results> {
         out: &args.out,
         journal: Journal::open(&args.out, args.fresh)?,
         cache: Cache::new(&truth),
-        judges: Judges { lpips, hdr_flip: false },
-        weights_hash,
+        judge,
         record: args.record.as_deref(),
         one_case: false,
         reused: 0,
@@ -113,7 +99,6 @@ impl Run<'_> {
             .with_context(|| format!("cannot create the folder {}", self.out.display()))?;
         let radius = source::radius_of(&loaded.scene, entry.settings.radius)?;
         let mut starts = Starts::new(&loaded.scene);
-        self.judges.hdr_flip = entry.settings.hdr_flip;
         let paths = paths(&loaded, &entry.settings.paths)?;
         let stages: Vec<Stage<'_>> = paths
             .into_iter()
@@ -255,7 +240,7 @@ impl Run<'_> {
             "points": [settings.point_rays, u32::from(settings.threshold), settings.step.rays_still],
             "ray_budget": settings.step.ray_budget,
             "hdr_flip": settings.hdr_flip,
-            "lpips": self.weights_hash,
+            "judge": [json!(self.judge.weights), json!(self.judge.pixels_per_degree)],
         }));
         let what = format!("{name}: {}", job.name());
         let work = job.work(stage);
@@ -273,7 +258,7 @@ impl Run<'_> {
         let desk = Desk {
             out: self.out,
             folder: format!("pictures/{slug}/{}.{}", job.name(), key.short()),
-            judges: &self.judges,
+            judge: &self.judge,
             cache: &self.cache,
             truth,
             record: record.as_ref().map(|_| name),

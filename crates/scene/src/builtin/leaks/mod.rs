@@ -108,7 +108,8 @@ fn hang(b: &mut GlbBuilder, palette: &Palette, detail: Detail) {
 fn animate(b: &mut GlbBuilder, palette: &Palette, animation: AnimationId, detail: Detail) {
     let times: Vec<f32> = (0..=motion::KEYS).map(|i| SECONDS * i as f32 / motion::KEYS as f32).collect();
     let parts: Vec<f32> = times.iter().map(|t| t / SECONDS).collect();
-    let slides: [(_, _, fn(f32) -> Vec3); 2] =
+    type Place = fn(f32) -> Vec3;
+    let slides: [(_, _, Place); 2] =
         [("door", partitions::door(detail), motion::door), ("cart", things::cart(detail), motion::cart)];
     for (name, kit, place) in slides {
         let mesh = kit.mesh(b, name, |s| palette.of(s));

@@ -1,0 +1,141 @@
+//! Arguments of `dapple eval diff` and `dapple eval compare`: pictures that already exist.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+use dapple_metrics::PIXELS_PER_DEGREE;
+
+/// What `eval` does with pictures instead of a scene.
+#[derive(Debug, Clone, Subcommand)]
+pub(crate) enum EvalVerb {
+    /// Compare two pictures: PSNR, SSIM, FLIP and, with weights, LPIPS; HDR-FLIP for linear ones.
+    #[command(after_help = DIFF_EXAMPLES)]
+    Diff(DiffArgs),
+    /// Compare folders of pictures of equal names with a folder of references.
+    #[command(after_help = COMPARE_EXAMPLES)]
+    Compare(CompareArgs),
+    /// Write the report of results again, without tracing anything.
+    Report(ReportArgs),
+}
+
+const DIFF_EXAMPLES: &str = "\
+Examples:
+  dapple eval diff truth.png test.png
+  dapple eval diff truth.png test.png --kind flip,signed -o error.png     writes error-flip.png and error-signed.png
+  dapple eval diff truth.exr test.exr --kind flip -o error.png            HDR-FLIP of linear light
+  dapple eval diff truth.png test.png --lpips-weights lpips_v0.1_squeeze.safetensors --json
+
+PNG and JPEG files are sRGB-encoded, of 8 or 16 bits; EXR and HDR files hold linear light. FLIP and LPIPS see encoded
+pictures rounded to 8 bits. Transparent pixels are compared over black.";
+
+const COMPARE_EXAMPLES: &str = "\
+Examples:
+  dapple eval compare truth/ out/psao/ out/none/
+  dapple eval compare truth/ out/ --still-camera --maps out/maps          flicker, where it is, and the worst pictures
+  dapple eval compare truth/ out/ --csv out/frames.csv --json > out/compared.json
+
+Pictures belong together by name and follow one another as names do, frame-9 before frame-10.";
+
+/// How pictures are judged.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct JudgeArgs {
+    /// Weights for LPIPS (SqueezeNet), a .safetensors file; without them it is not computed.
+    #[arg(long, value_name = "FILE", env = "DAPPLE_LPIPS_WEIGHTS")]
+    pub(crate) lpips_weights: Option<PathBuf>,
+    /// Pixels a degree of visual angle, for FLIP, 1 to 1000.
+    #[arg(long, value_name = "N", default_value_t = PIXELS_PER_DEGREE)]
+    pub(crate) ppd: f32,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct DiffArgs {
+    /// The picture that is right.
+    pub(crate) reference: PathBuf,
+    /// The picture that is judged.
+    pub(crate) test: PathBuf,
+    #[command(flatten)]
+    pub(crate) judge: JudgeArgs,
+    /// Write a map of the error; with several kinds, their names are added to it.
+    #[arg(short, long, value_name = "FILE.png")]
+    pub(crate) output: Option<PathBuf>,
+    /// Which error the map shows; several can be listed.
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        value_name = "KIND,…",
+        default_value = "flip",
+        requires = "output"
+    )]
+    pub(crate) kind: Vec<ErrorMap>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct CompareArgs {
+    /// The folder of pictures that are right.
+    pub(crate) reference: PathBuf,
+    /// Folders of pictures that are judged.
+    #[arg(required = true, value_name = "TEST")]
+    pub(crate) tests: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) judge: JudgeArgs,
+    /// The camera stands still: measure how much pixels change from picture to picture.
+    #[arg(long)]
+    pub(crate) still_camera: bool,
+    /// How many of the worst pictures are named, by FLIP.
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    pub(crate) worst: usize,
+    /// Write FLIP's maps of the worst pictures, and with --still-camera those of flicker, into this folder.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) maps: Option<PathBuf>,
+    /// Write a line for each picture to this file.
+    #[arg(long, value_name = "FILE.csv")]
+    pub(crate) csv: Option<PathBuf>,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ReportArgs {
+    /// A results.json, beside the pictures that it names.
+    #[arg(value_name = "results.json")]
+    pub(crate) results: PathBuf,
+    /// The page to write [default: report.html beside the results].
+    #[arg(short, long, value_name = "FILE.html")]
+    pub(crate) output: Option<PathBuf>,
+}
+
+/// What a map of errors shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ErrorMap {
+    /// FLIP (HDR-FLIP of linear pictures): black is 0, pale yellow 1.
+    Flip,
+    /// test - reference, mean of the channels: blue is too dark, brown too light, from -0.25 to 0.25.
+    Signed,
+    /// Its size, mean over the channels: black is 0, yellow 0.25 and above.
+    Absolute,
+    /// Its square, mean over the channels: black is 0, yellow 0.0625 and above.
+    Squared,
+    /// 1 - SSIM around each pixel: black is 0, pale yellow 1 and above.
+    Ssim,
+    /// LPIPS: black is 0, pale yellow 1 and above. Needs weights.
+    Lpips,
+}
+
+impl ErrorMap {
+    /// As on the command line.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            ErrorMap::Flip => "flip",
+            ErrorMap::Signed => "signed",
+            ErrorMap::Absolute => "absolute",
+            ErrorMap::Squared => "squared",
+            ErrorMap::Ssim => "ssim",
+            ErrorMap::Lpips => "lpips",
+        }
+    }
+}
