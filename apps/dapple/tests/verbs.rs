@@ -103,6 +103,10 @@ fn diff_compares_linear_light_at_all_exposures() {
     let squares: f64 = truth.iter().map(|v| f64::from(*v) * f64::from(*v)).sum::<f64>() / truth.len() as f64;
     assert!((found["mse"].as_f64().unwrap() * 16.0 / squares - 1.0).abs() < 1e-6, "{found}");
     assert_eq!((&found["ssim"], &found["flip"]), (&Value::Null, &Value::Null));
+    linear(0.0).save(folder.path().join("black.exr")).unwrap();
+    let dark = succeed(folder.path(), &["eval", "diff", "black.exr", "test.exr"]);
+    assert!(dark.contains("not black"), "{dark}");
+    fail(folder.path(), &["eval", "diff", "black.exr", "test.exr", "-o", "map.png"], &["no light in it"]);
     let text = succeed(folder.path(), &["eval", "diff", "truth.exr", "test.exr"]);
     assert!(text.contains("HDR-FLIP") && text.contains("exposures") && text.contains("peak 31.33"), "{text}");
 }

@@ -122,7 +122,7 @@ pub(crate) enum ErrorMap {
     Squared,
     /// 1 - SSIM around each pixel: black is 0, pale yellow 1 and above.
     Ssim,
-    /// LPIPS: black is 0, pale yellow 1 and above. Needs weights.
+    /// LPIPS: black is 0, pale yellow 0.5 and above. Needs weights.
     Lpips,
 }
 

@@ -166,9 +166,11 @@ impl Test {
             let (reference, test) =
                 (Picture::read(&args.reference.join(name))?, Picture::read(&self.folder.join(name))?);
             let found = judge.measure(&reference, &test)?;
-            let path = own.join(format!("{}-flip.png", stem(name)));
-            write_map(&path, &reference, &heat(&found.flip_map))?;
-            self.maps.push(path);
+            if let Some(map) = found.flip_map {
+                let path = own.join(format!("{}-flip.png", stem(name)));
+                write_map(&path, &reference, &heat(&map))?;
+                self.maps.push(path);
+            }
         }
         if let Some(mut flicker) = flicker {
             ensure!(flicker.len() == like.luma().len(), "pictures changed while they were read");

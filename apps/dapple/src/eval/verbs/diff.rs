@@ -98,11 +98,15 @@ fn table(found: &Found, picture: &Picture, args: &DiffArgs) -> String {
         );
         unit("HDR-FLIP", measured.hdr_flip, meaning);
     }
+    let is_linear = measured.flip.is_none();
     unit("LPIPS", measured.lpips, "0 is equal".to_owned());
-    if measured.flip.is_some() && measured.ssim.is_none() {
+    if is_linear && measured.hdr_flip.is_none() {
+        rows.push(("HDR-FLIP", "-".to_owned(), "needs a reference that is not black".to_owned()));
+    }
+    if !is_linear && measured.ssim.is_none() {
         rows.push(("SSIM", "-".to_owned(), format!("needs {SSIM_MIN_SIDE} pixels on each side, not {side}")));
     }
-    if measured.flip.is_some() && measured.lpips.is_none() {
+    if !is_linear && measured.lpips.is_none() {
         let reason = if side < LPIPS_MIN_SIDE {
             format!("needs {LPIPS_MIN_SIDE} pixels on each side, not {side}")
         } else {
@@ -131,6 +135,6 @@ fn legend(kind: ErrorMap) -> &'static str {
         ErrorMap::Absolute => "absolute error, black 0 to yellow 0.25",
         ErrorMap::Squared => "squared error, black 0 to yellow 0.0625",
         ErrorMap::Ssim => "1 - SSIM, black 0 to pale yellow 1",
-        ErrorMap::Lpips => "LPIPS, black 0 to pale yellow 1",
+        ErrorMap::Lpips => "LPIPS, black 0 to pale yellow 0.5",
     }
 }

@@ -16,6 +16,9 @@ use crate::args::ErrorMap;
 use crate::judge::Judge;
 use crate::picture::write_png;
 
+/// LPIPS at which its map is palest.
+const LPIPS_RANGE: f32 = 0.5;
+
 /// What was found. What does not apply to the pictures is absent.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Measured {
@@ -38,10 +41,10 @@ impl Measured {
     }
 }
 
-/// The metrics of a pair, and FLIP's map.
+/// The metrics of a pair, and FLIP's map; without one and exposures if linear pictures have a black reference.
 pub(super) struct Found {
     pub(super) measured: Measured,
-    pub(super) flip_map: Vec<f32>,
+    pub(super) flip_map: Option<Vec<f32>>,
     pub(super) exposures: Option<Exposures>,
 }
 
@@ -68,24 +71,27 @@ impl Judge {
                     hdr_flip: None,
                     lpips: lpips.transpose()?,
                 };
-                Ok(Found { measured, flip_map: flip.error_map, exposures: None })
+                Ok(Found { measured, flip_map: Some(flip.error_map), exposures: None })
             }
             (Values::Linear(reference), Values::Linear(test)) => {
-                let peak = reference.iter().copied().fold(0.0, f32::max);
-                if peak == 0.0 {
-                    return Err(MetricError::Black.into());
-                }
-                let flip = flip_hdr(width, height, reference, test, self.pixels_per_degree, None)?;
+                let brightest = reference.iter().copied().fold(0.0, f32::max);
+                let peak = if brightest > 0.0 { brightest } else { 1.0 };
+                let flip = match flip_hdr(width, height, reference, test, self.pixels_per_degree, None) {
+                    // A sequence may well begin in the dark.
+                    Err(MetricError::Black) => None,
+                    flip => Some(flip?),
+                };
                 let measured = Measured {
                     mse,
                     peak,
                     psnr_db: finite(psnr(reference, test, peak)?),
                     ssim: None,
                     flip: None,
-                    hdr_flip: Some(flip.mean),
+                    hdr_flip: flip.as_ref().map(|flip| flip.mean),
                     lpips: None,
                 };
-                Ok(Found { measured, flip_map: flip.error_map, exposures: Some(flip.exposures) })
+                let (flip_map, exposures) = flip.map(|flip| (flip.error_map, flip.exposures)).unzip();
+                Ok(Found { measured, flip_map, exposures })
             }
             _ => bail!("one picture is sRGB-encoded and the other linear light: convert one of them"),
         }
@@ -106,7 +112,7 @@ impl Judge {
             Values::Linear(_) => bail!("--kind {} is for sRGB-encoded pictures", kind.name()),
         };
         match kind {
-            ErrorMap::Flip => Ok(heat(&found.flip_map)),
+            ErrorMap::Flip => Ok(heat(found.flip_map.as_ref().ok_or(MetricError::Black)?)),
             ErrorMap::Signed => cool_to_warm(width, height, errors(PixelError::Signed)?, ErrorKind::Signed),
             ErrorMap::Absolute => {
                 cool_to_warm(width, height, errors(PixelError::Absolute)?, ErrorKind::Absolute)
@@ -135,7 +141,8 @@ impl Judge {
                     bail!("--kind lpips needs --lpips-weights FILE or DAPPLE_LPIPS_WEIGHTS");
                 };
                 let (reference, test) = (encoded(&reference.values)?, encoded(&test.values)?);
-                Ok(heat(&lpips.distance_map(width, height, &reference, &test)?.map))
+                let map = lpips.distance_map(width, height, &reference, &test)?.map;
+                Ok(heat(&map.iter().map(|d| d / LPIPS_RANGE).collect::<Vec<f32>>()))
             }
         }
     }
