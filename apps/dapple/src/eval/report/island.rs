@@ -228,8 +228,8 @@ fn row_data<'a>(
 
 /// Metrics of single pictures, under the keys of their columns. Single precision is more than a plot shows.
 fn frame_metrics(frames: &[FrameRow]) -> BTreeMap<&'static str, Vec<Option<f32>>> {
-    type Get = fn(&FrameRow) -> Option<f64>;
-    const METRICS: [(&str, Get); 7] = [
+    type Metric = (&'static str, fn(&FrameRow) -> Option<f64>);
+    const METRICS: [Metric; 7] = [
         (columns::VISIBILITY, |f| f.visibility_psnr_db),
         ("psnr_db", |f| f.psnr_db),
         ("ssim", |f| Some(f.ssim)),

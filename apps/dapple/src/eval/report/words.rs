@@ -265,10 +265,37 @@ pub(super) fn advice(results: &Results) -> String {
         let case = advice.case.and_then(|case| results.cases.get(case));
         let about =
             case.filter(|_| results.cases.len() > 1).map(|case| format!("<b>{}</b>: ", escape(&case.name)));
-        let _ = writeln!(html, "<li>{}{}</li>", about.unwrap_or_default(), escape(&advice.text));
+        let _ = writeln!(html, "<li>{}{}</li>", about.unwrap_or_default(), with_flags(&advice.text));
     }
     html.push_str("</ul></aside>\n");
     html
+}
+
+/// What the truth's own noise means for figures.
+fn noise(rms: f64) -> String {
+    if rms <= 0.0 {
+        return String::new();
+    }
+    let limit_db = number(-20.0 * rms.log10(), 1);
+    format!(
+        "; its own noise is {} (root mean square): no method can be seen above {limit_db} dB",
+        number(rms, 4)
+    )
+}
+
+/// Text with its command-line flags set apart.
+fn with_flags(text: &str) -> String {
+    let word = |word: &str| match word.starts_with("--") && word.len() > 2 {
+        true => format!("<code class=\"word\">{}</code>", escape(word)),
+        false => escape(word),
+    };
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
+}
+
+/// Text whose lines break between words alone.
+fn whole_words(text: &str) -> String {
+    let word = |word: &str| format!("<span class=\"word\">{}</span>", escape(word));
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
 /// All rows of all cases; scripts make it sortable.
@@ -374,7 +401,7 @@ pub(super) fn made(results: &Results) -> String {
     let (run, machine) = (&results.run, &results.machine);
     let mut html = format!(
         "<div class=\"command\"><pre><code id=\"command\">{}</code></pre></div>\n<dl class=\"facts\">\n",
-        escape(&run.command)
+        whole_words(&run.command)
     );
     let commit = run.commit.as_deref().unwrap_or("unknown");
     let threads =
@@ -422,12 +449,10 @@ pub(super) fn made(results: &Results) -> String {
             (
                 "truth",
                 format!(
-                    "{} rays a pixel within {} m; its own noise is {} (root mean square), so that no method can be seen \
-                     above {} dB",
+                    "{} rays a pixel within {} m{}",
                     number(f64::from(case.reference_rays), 0),
                     case.radius_m,
-                    number(case.truth.noise_rms, 4),
-                    number(-20.0 * case.truth.noise_rms.log10(), 1)
+                    noise(case.truth.noise_rms)
                 ),
             ),
             ("seed", case.seed.to_string()),

@@ -95,9 +95,9 @@ function figureText(column, [value, ci95]) {
   return text(value, column.digits) + interval + unit;
 }
 
-/** What tells a row from others of its method in words, but for one parameter. */
-function settingOf(row, without = null) {
-  return row.setting.filter(([key]) => key !== without).map(([, words]) => words).join(", ");
+/** What tells a row from others of its method in words, but for some parameters. */
+function settingOf(row, ...without) {
+  return row.setting.filter(([key]) => !without.includes(key)).map(([, words]) => words).join(", ");
 }
 
 /** A row's name in one line. A method's own name may say its rays, as `rtao-16` does. */

@@ -211,9 +211,17 @@ function pixelText(color, index) {
   return { hex, words: text(at, 3) };
 }
 
+let lastPoint = null;
+
+/** Reads once more where the pointer is, after what is there has changed. */
+function readAgain() {
+  if (lastPoint) readOut(lastPoint);
+}
+
 /** Says what is under the pointer, in every picture that is compared. */
 function readOut(event) {
   const place = event && placeInPane(event);
+  lastPoint = event && { clientX: event.clientX, clientY: event.clientY };
   if (!place) {
     ui.readout.textContent = "Point at a pixel to read its values";
     return;

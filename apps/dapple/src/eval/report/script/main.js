@@ -38,6 +38,12 @@ function drawWorst() {
         const image = make("img", { alt: "", decoding: "async" });
         const thumb = make("button", { type: "button", "aria-label": `${rowName(row)} at ${when}: ${column.title} ${words}` }, image, make("span", {}, make("b", {}, words), ` ${when}`));
         thumb.style.setProperty("--aspect", found.width / found.height);
+        if (!hasPictures(caseIndex)) {
+          image.remove();
+          thumb.classList.add("bare");
+          thumb.disabled = true;
+          return thumb;
+        }
         whenNear(thumb, () => {
           const url = pictureUrl(pictureNumber(caseIndex, index, frame, view));
           image.onerror = () => image.remove();
@@ -88,8 +94,14 @@ function startContents() {
     const passed = sections.filter((section) => section.getBoundingClientRect().top < innerHeight * 0.35);
     const current = atEnd ? sections.at(-1) : passed.at(-1);
     for (const [id, link] of links) {
-      if (id === current?.id) link.setAttribute("aria-current", "true");
-      else link.removeAttribute("aria-current");
+      if (id !== current?.id) {
+        link.removeAttribute("aria-current");
+      } else if (!link.hasAttribute("aria-current")) {
+        link.setAttribute("aria-current", "true");
+        // Where the bar is too narrow for all.
+        const bar = link.parentElement;
+        bar.scrollLeft = link.offsetLeft - bar.offsetLeft - (bar.clientWidth - link.offsetWidth) / 2;
+      }
     }
   };
   let waiting = false;

@@ -31,7 +31,7 @@ function qualityOf(caseIndex, metric, cost, grouping) {
     } else {
       const others = Object.entries(row.params).filter(([key]) => key !== grouping);
       const key = JSON.stringify([row.method, others.sort()]);
-      const line = lines.get(key) ?? { method: row.method, extra: settingOf(row, grouping), points: [] };
+      const line = lines.get(key) ?? { method: row.method, extra: extraOf(row), points: [] };
       lines.set(key, line);
       line.points.push({ row, index, x: price[0], xCi95: price[1], y: figure[0], ci95: figure[1] });
     }
@@ -119,6 +119,7 @@ function qualityPlot(place, caseIndex, small) {
             near = found;
             plot.redraw(false);
           }
+          plot.over.classList.toggle("pick", Boolean(near));
           if (!near) return hint.hide();
           const box = plot.over.getBoundingClientRect();
           const { row } = near.point;
@@ -129,7 +130,11 @@ function qualityPlot(place, caseIndex, small) {
     cursor: { x: false, y: false },
   };
   const plot = plotIn(place, options, values, (width) => Math.min(small ? 320 : 460, Math.max(small ? 220 : 260, width * 0.5)));
-  plot.over.addEventListener("mouseleave", () => hint.hide());
+  plot.over.addEventListener("mouseleave", () => {
+    near = null;
+    plot.redraw(false);
+    hint.hide();
+  });
   plot.over.addEventListener("click", () => {
     if (near) showInViewer({ case: caseIndex, a: TRUTH, b: near.point.index });
   });
@@ -160,17 +165,21 @@ function rangeY(points, levels) {
   for (const { y } of levels) {
     if (y > low - size && y < high + size) [low, high] = [Math.min(low, y), Math.max(high, y)];
   }
-  const room = Math.max((high - low) * 0.09, size * 0.05);
+  const room = Math.max((high - low) * 0.09, (size - (high - low)) / 2);
   return [low - room, high + room];
+}
+
+/** What tells a row's line from others of its method, in words. */
+function extraOf(row) {
+  return settingOf(row, qualityState.grouping, "rays_per_pixel");
 }
 
 /** What tells lines of one method apart, over all cases, so that dashes mean the same everywhere. */
 function extrasOf() {
-  const extras = cases.flatMap((one) => one.rows.map((row) => settingOf(row, qualityState.grouping)));
-  const streamed = cases.flatMap((one) => one.rows.map((row) => Boolean(row.figures[qualityState.cost])));
-  const found = [...new Set(extras.filter((_, i) => streamed[i]))];
-  // The most points or the highest rate, which is what most look at, has a line without dashes.
-  return found.sort((a, b) => b.localeCompare(a, "en", { numeric: true }));
+  const rows = cases.flatMap((one) => one.rows).filter((row) => row.figures[qualityState.cost]);
+  const found = [...new Set(rows.map(extraOf))];
+  // The most points or the highest rate, which is what most look at, has a line without dashes; so has what has no such.
+  return found.sort((a, b) => (a === "" ? -1 : b === "" ? 1 : b.localeCompare(a, "en", { numeric: true })));
 }
 
 function lineLabel(line, lines) {
@@ -264,7 +273,7 @@ function drawQuality(plot, pen, { lines, on, off, labels, roomy, near, metric, n
     }
   }
   if (roomy) drawLabels(pen, labels, lines, { x, y, left, top, width, height, scale });
-  drawOff(pen, off, metric, { left, top, height, scale, y });
+  drawOff(pen, off, metric, { right: left + width, top, height, scale, y });
 }
 
 function drawInterval(pen, point, x, y, scale) {
@@ -331,13 +340,14 @@ function drawLabels(pen, labels, lines, { x, y, left, top, width, height, scale 
 }
 
 /** Levels that are too far away to be drawn are named at the edge they lie behind. */
-function drawOff(pen, off, metric, { left, top, height, scale, y }) {
+function drawOff(pen, off, metric, { right, top, height, scale, y }) {
   let [below, above] = [0, 0];
   for (const level of off) {
     const under = y(level.y) > top + height;
     const words = `${under ? "↓" : "↑"} ${level.name} ${text(level.y, Math.min(metric.digits, 3))}`;
     const at = under ? top + height - (12 + 16 * below++) * scale : top + (12 + 16 * above++) * scale;
-    writeClear(pen, words, left + 8 * scale, at, colorOf(level.row.method));
+    // On the right: what costs more is seldom as bad.
+    writeClear(pen, words, right - 6 * scale - pen.measureText(words).width, at, colorOf(level.row.method));
   }
 }
 
@@ -386,8 +396,9 @@ function drawQualityLegend() {
     legend.append(button);
   }
   const extras = extrasOf();
-  if (extras.length > 1) {
+  if (extras.filter(Boolean).length > 1) {
     for (const [i, extra] of extras.entries()) {
+      if (!extra) continue;
       legend.append(make("span", { className: "dash" }, swatch(null, DASHES[i % DASHES.length]), extra));
     }
   }

@@ -5,8 +5,9 @@ const MODES = [
   ["pair", "Pair", "Two pictures side by side"],
   ["grid", "All", "All methods"],
 ];
-/** Largest zoom: this many pixels of the page for one of a picture. */
+/** Largest zoom: this many pixels of the page for one of a picture; small pictures, which begin there, this many times. */
 const MAX_ZOOM = 16;
+const LEAST_MAX_ZOOM = 4;
 
 /** What is shown. The view is in parts of the picture: zoom 1 is the whole, (x, y) the middle. */
 const show = {
@@ -113,6 +114,7 @@ function fillFilm() {
   const frames = frameCount() <= 60 ? [...Array(frameCount()).keys()] : inPage.slice(0, 120);
   ui.film.replaceChildren(...frames.map((frame) => {
     const image = make("img", { alt: "", decoding: "async" });
+    image.onerror = () => image.removeAttribute("src");
     const time = found.time_s[frame];
     const button = make("button", { type: "button", "aria-label": `Picture ${frame + 1}` }, image, make("span", {}, time === undefined ? `${frame + 1}` : `${text(time, 2)} s`));
     button.dataset.frame = frame;
@@ -187,7 +189,10 @@ function showPictures() {
       continue;
     }
     one.image.onerror = () => none(`not in this page: ${data.names[number]}`);
-    one.image.onload = () => (one.empty.hidden = true);
+    one.image.onload = () => {
+      one.empty.hidden = true;
+      readAgain();
+    };
     one.image.src = url;
   }
 }
@@ -219,6 +224,7 @@ function showFacts() {
   if (show.mode === "slider") {
     ui.tagA.replaceChildren(...head(show.a).filter(Boolean));
     ui.tagB.replaceChildren(...head(show.b).filter(Boolean));
+    ui.facts.replaceChildren(...[["A", show.a], ["B", show.b]].filter(([, index]) => index !== TRUTH).map(([side, index]) => make("span", {}, make("b", {}, `${side} `), facts(index))));
   } else {
     for (const one of ui.panes) one.caption.replaceChildren(...head(one.index).filter(Boolean));
   }
@@ -269,7 +275,7 @@ function placeViews() {
 function zoomBy(factor, atX = 0.5, atY = 0.5) {
   const pane = ui.panes[0]?.element;
   if (!pane) return;
-  const most = Math.max(1, (MAX_ZOOM * cases[show.case].width) / pane.clientWidth);
+  const most = Math.max(LEAST_MAX_ZOOM, (MAX_ZOOM * cases[show.case].width) / pane.clientWidth);
   const zoom = Math.min(Math.max(1, show.zoom * factor), most);
   // What is under the place stays there.
   const x = show.x + (atX - 0.5) * (1 / show.zoom - 1 / zoom);
@@ -304,7 +310,7 @@ function showScale() {
   const gradient = (hex) => `linear-gradient(to right, ${hex.match(/.{6}/g).map((color) => `#${color}`).join(", ")})`;
   const range = data.scales.error_range;
   const scale = {
-    visibility: ["#000000ffffff", "blocked 0", "1 open"],
+    visibility: ["000000ffffff", "blocked 0", "1 open"],
     error: [data.scales.error, `−${range} too dark`, `too bright +${range}`],
     flip: [data.scales.flip, "FLIP 0 equal", "1"],
   }[show.view];
@@ -363,6 +369,7 @@ function startViewer() {
   ui.tags = make("div", { className: "tags" }, ui.tagA, ui.tagB);
   ui.stage = make("div", { className: "stage", tabIndex: 0, role: "group", "aria-label": "Pictures compared; arrow keys change the moment, F flips, plus and minus zoom" });
   ui.wheelHint = make("p", { className: "wheel-hint", hidden: true, "aria-hidden": "true" }, "Click the picture to zoom with the wheel, or hold Ctrl");
+  ui.facts = make("div", { className: "facts-below" });
   ui.scale = make("div", { className: "scale" });
   ui.readout = make("div", { className: "readout" }, "Point at a pixel to read its values");
   ui.frames = make("input", { type: "range", min: 0, step: 1, "aria-label": "Moment along the path" });
@@ -378,7 +385,7 @@ function startViewer() {
     make("div", { className: "controls" }, ui.cases, ui.views, ui.modes, make("div", { className: "tools" }, zoom, ui.flip, full)),
     make("div", { className: "choice" }, ui.a, swap, ui.b),
     make("div", { className: "stage-box" }, ui.stage, ui.wheelHint),
-    make("div", { className: "under" }, ui.readout, ui.scale),
+    make("div", { className: "under" }, ui.facts, ui.readout, ui.scale),
     ui.moments,
     ui.film,
     make("details", {}, make("summary", {}, "Keys"), make("dl", { className: "keys" }, ...keys.flatMap(([key, words]) => [make("dt", {}, ...key.split(" ").map((k) => make("kbd", {}, k))), make("dd", {}, words)]))),
