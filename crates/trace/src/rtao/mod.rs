@@ -1,14 +1,15 @@
 //! Ray-traced ambient occlusion: the visibility of sites, from many rays each. The truth for all other methods.
 //!
 //! - takes: a [`Tracer`], sites (position, normal, key), [`RtaoParams`]
-//! - returns: for each site the part of its cosine-weighted hemisphere that is open within the radius, 0 … 1
+//! - returns: for each site the part of its cosine-weighted hemisphere that is open within the radius, 0 … 1; if asked also
+//!   the mean of the open directions, the bent normal
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use dapple_scene::glam::Vec3;
 use rayon::prelude::*;
 
-use crate::bvh::{MAX_DIRECTIONS, Tracer, count_blocked, offset_origin};
+use crate::bvh::{BlockedMask, MAX_DIRECTIONS, Tracer, count_blocked, offset_origin};
 use crate::sampling::{extend_pattern, hash, orthonormal_basis};
 
 #[cfg(test)]
@@ -74,34 +75,98 @@ pub fn trace_visibility_with_progress(
     progress: &(dyn Fn(u64) + Sync),
 ) {
     assert_eq!(sites.len(), visibility.len(), "one visibility for each site");
+    trace_each(sites, visibility, progress, |site, directions| {
+        let mut blocked = 0;
+        let rays = trace_site(tracer, site, params, directions, |_, mask| blocked += count_blocked(mask));
+        if rays == 0 { 1.0 } else { (rays - blocked) as f32 / rays as f32 }
+    });
+}
+
+/// Visibility of a site, and where from light comes to it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BentVisibility {
+    /// 1 open, 0 blocked: to the bit what [`trace_visibility`] gives.
+    pub visibility: f32,
+    /// Mean over all rays of the directions that are open (blocked ones count as zero), in the world. Its direction is the
+    /// *bent normal*, weighted by cosine; its length is 2/3 where all is open, and 0 where nothing is.
+    pub open_world: Vec3,
+}
+
+/// As [`trace_visibility_with_progress`], with the mean of the open directions.
+///
+/// # Panics
+///
+/// If `sites` and `bent` differ in length.
+pub fn trace_bent_with_progress(
+    tracer: &Tracer,
+    sites: &[Site],
+    params: &RtaoParams,
+    bent: &mut [BentVisibility],
+    progress: &(dyn Fn(u64) + Sync),
+) {
+    assert_eq!(sites.len(), bent.len(), "one result for each site");
+    trace_each(sites, bent, progress, |site, directions| {
+        let (mut blocked, mut sum) = (0, Vec3::ZERO);
+        let rays = trace_site(tracer, site, params, directions, |directions, mask| {
+            blocked += count_blocked(mask);
+            for (i, direction) in directions.iter().enumerate() {
+                if mask[i / 64] >> (i % 64) & 1 == 0 {
+                    sum += *direction;
+                }
+            }
+        });
+        match rays {
+            0 => BentVisibility { visibility: 1.0, open_world: Vec3::ZERO },
+            _ => BentVisibility {
+                visibility: (rays - blocked) as f32 / rays as f32,
+                open_world: sum / rays as f32,
+            },
+        }
+    });
+}
+
+/// Fills a list parallel to the sites, in parallel; each task has one buffer for directions.
+fn trace_each<T: Send>(
+    sites: &[Site],
+    results: &mut [T],
+    progress: &(dyn Fn(u64) + Sync),
+    trace: impl Fn(&Site, &mut Vec<Vec3>) -> T + Sync,
+) {
     let done = AtomicU64::new(0);
-    sites.par_chunks(CHUNK).zip(visibility.par_chunks_mut(CHUNK)).for_each(|(sites, visibility)| {
+    sites.par_chunks(CHUNK).zip(results.par_chunks_mut(CHUNK)).for_each(|(sites, results)| {
         let mut directions = Vec::with_capacity(MAX_DIRECTIONS);
-        for (site, visibility) in sites.iter().zip(visibility) {
-            *visibility = trace_site(tracer, site, params, &mut directions);
+        for (site, result) in sites.iter().zip(results) {
+            *result = trace(site, &mut directions);
         }
         let before = done.fetch_add(sites.len() as u64, Ordering::Relaxed);
         progress(before + sites.len() as u64);
     });
 }
 
-fn trace_site(tracer: &Tracer, site: &Site, params: &RtaoParams, directions: &mut Vec<Vec3>) -> f32 {
+/// Traces the rays of a site in batches, each given to `batch` with what blocks it; tells how many rays there were, 0 for a
+/// site without a normal.
+fn trace_site(
+    tracer: &Tracer,
+    site: &Site,
+    params: &RtaoParams,
+    directions: &mut Vec<Vec3>,
+    mut batch: impl FnMut(&[Vec3], &BlockedMask),
+) -> u32 {
     let normal = site.normal_world;
     if !normal.is_finite() || normal == Vec3::ZERO {
-        return 1.0;
+        return 0;
     }
     let rays = params.rays.clamp(1, MAX_RAYS);
     let origin = offset_origin(site.position_world, normal);
     let (tangent, bitangent) = orthonormal_basis(normal);
     let site_hash = hash(params.seed, site.key, 0);
-    let mut blocked = 0;
     for first in (0..rays).step_by(MAX_DIRECTIONS) {
         directions.clear();
         extend_pattern(first..rays.min(first + MAX_DIRECTIONS as u32), site_hash, directions);
         for d in directions.iter_mut() {
             *d = tangent * d.x + bitangent * d.y + normal * d.z;
         }
-        blocked += count_blocked(&tracer.occlusion(origin, directions, params.radius_m));
+        batch(directions, &tracer.occlusion(origin, directions, params.radius_m));
     }
-    (rays - blocked) as f32 / rays as f32
+    rays
 }
