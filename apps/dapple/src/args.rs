@@ -1,5 +1,6 @@
 //! Command-line arguments.
 
+pub(crate) mod bake;
 mod view;
 mod watch;
 
@@ -9,6 +10,7 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
 
+pub(crate) use bake::BakeArgs;
 pub(crate) use view::{Preset, ViewArgs, ViewKind};
 pub(crate) use watch::{DemoArgs, InspectArgs, LightArgs, RecordArgs};
 
@@ -31,6 +33,9 @@ pub(crate) enum Command {
     /// Compare reconstructions of visibility over all surfaces of a scene, or near thin walls, with traced truth.
     #[command(after_help = QUALITY_EXAMPLES)]
     Quality(QualityArgs),
+    /// Write ray-traced visibility into a scene's file, as a texture or at vertices, or into one of points.
+    #[command(after_help = bake::BAKE_EXAMPLES)]
+    Bake(BakeArgs),
     /// Write a built-in scene as a GLB that any glTF viewer opens.
     #[command(after_help = SCENE_EXAMPLES)]
     Scene(SceneArgs),

@@ -13,6 +13,11 @@ use dapple_trace::rtao::Site;
 
 /// Writes a whole file: into a neighbour first, then renamed over the old one.
 pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_parts(path, &[bytes])
+}
+
+/// As [`write_file`], of bytes that follow each other.
+pub(crate) fn write_parts(path: &Path, parts: &[&[u8]]) -> Result<()> {
     if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder)
             .with_context(|| format!("cannot create the folder {}", folder.display()))?;
@@ -21,14 +26,16 @@ pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
     let resolved = std::fs::canonicalize(path);
     let path = resolved.as_deref().unwrap_or(path);
     if std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
-        return std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()));
+        let written = std::fs::File::create(path)
+            .and_then(|mut file| parts.iter().try_for_each(|part| file.write_all(part)));
+        return written.with_context(|| format!("cannot write {}", path.display()));
     }
     let name = path.file_name().with_context(|| format!("{} names no file", path.display()))?;
     let mut partial = name.to_owned();
     partial.push(format!(".{}.tmp", std::process::id()));
     let partial = path.with_file_name(partial);
     let written = std::fs::File::create(&partial).and_then(|mut file| {
-        file.write_all(bytes)?;
+        parts.iter().try_for_each(|part| file.write_all(part))?;
         file.sync_all()
     });
     let moved = written.and_then(|()| std::fs::rename(&partial, path));
