@@ -33,6 +33,20 @@ pub(crate) struct BakeArgs {
     /// light), or a name of your own such as _VISIBILITY (one float).
     #[arg(long, value_name = "NAME", default_value = "COLOR_0")]
     pub(crate) attribute: Attribute,
+    /// Set of texture coordinates that a texture is laid out in.
+    #[arg(long, value_enum, default_value = "auto")]
+    pub(crate) uv: Uv,
+    /// Longest side of an image in texels, 16 to 16384. One image holds all new coordinates if texels can be as coarse as
+    /// that needs.
+    #[arg(long, value_name = "N", default_value_t = 4096)]
+    pub(crate) texture_size: u32,
+    /// Edge of a texel in metres, on as many images as that needs [default: what fits one image; a 12th of the radius if
+    /// there is room, finer for small scenes].
+    #[arg(long, value_name = "METRES", allow_hyphen_values = true)]
+    pub(crate) texel: Option<f64>,
+    /// Texels that stay free around each piece of surface in new coordinates, 1 to 64.
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub(crate) margin: u32,
     /// Store where light comes from, too: the mean open direction, as the attribute _BENT_NORMAL or a second texture.
     #[arg(long)]
     pub(crate) bent_normals: bool,
@@ -78,6 +92,20 @@ pub(crate) enum Instances {
     Split,
     /// One bake for all, the mean.
     Share,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Uv {
+    /// The second set, else the first, where no surfaces overlap in it; a new one where they do.
+    Auto,
+    /// The first set where nothing overlaps in it, else a new one.
+    #[value(name = "0")]
+    First,
+    /// The second set where nothing overlaps in it, else a new one.
+    #[value(name = "1")]
+    Second,
+    /// A new set, behind those there are.
+    New,
 }
 
 /// A name for an attribute of vertices.

@@ -145,6 +145,11 @@ impl Pool {
         parts.dedup();
         parts
     }
+
+    /// Whether a part is written in several pieces, as its triangles lie on several images.
+    pub(crate) fn spans_pages(&self) -> bool {
+        self.pieces.windows(2).any(|pair| pair[0].part == pair[1].part)
+    }
 }
 
 impl Copy {

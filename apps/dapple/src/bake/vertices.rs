@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Mesh, MeshOrigin};
 
-use super::accessor::{Attribute, Component};
+use super::accessor::{Attribute, Component, Elements};
 use super::fit::{Fit, HIDDEN_WEIGHT};
 use super::plan::{Copy, MeshPlan, Pool, place_in_triangle, triangles_of};
 use super::surfaces::{Place, Surfaces};
@@ -175,21 +175,20 @@ pub(crate) fn bent_attribute(values: &[Option<&AtVertex>]) -> Attribute {
     Attribute { name, kind, component, normalized: false, bytes }
 }
 
-/// Colours: what the file has (white otherwise), multiplied by visibility; alpha stays. Floats stay floats, all else becomes
-/// 16 bits.
+/// Colours: what the file has (white otherwise) at `element_of` each vertex, multiplied by visibility; alpha stays. Floats stay
+/// floats, all else becomes 16 bits.
 pub(crate) fn color_attribute(
     values: &[Option<&AtVertex>],
-    given: Option<(&super::accessor::Elements<'_>, &dyn Fn(usize) -> usize)>,
+    given: Option<&Elements<'_>>,
+    element_of: &dyn Fn(usize) -> usize,
 ) -> Attribute {
-    let is_float = given.is_some_and(|(elements, _)| elements.component() == Component::F32);
+    let is_float = given.is_some_and(|elements| elements.component() == Component::F32);
     let mut bytes = Vec::with_capacity(values.len() * if is_float { 16 } else { 8 });
     for (i, value) in values.iter().enumerate() {
         let visibility = value.map_or(1.0, |v| v.visibility);
         for channel in 0..4 {
             let before = match given {
-                Some((elements, element_of)) if channel < elements.width => {
-                    elements.fraction(element_of(i), channel)
-                }
+                Some(elements) if channel < elements.width => elements.fraction(element_of(i), channel),
                 _ => 1.0,
             };
             let after = if channel < 3 { before * visibility } else { before };
