@@ -67,7 +67,8 @@ Examples:
   dapple render room.glb -o room.png
   dapple render --builtin atrium --time 4 --camera eye=2,1.7,5,target=0,1,0,fov=60 --method rtao -o truth.png
   dapple render city.glb --method psao --points 256 --radius auto --view visibility -o visibility.png
-  dapple render --builtin atrium --view error -o error.png        psao against rtao, per pixel";
+  dapple render --builtin atrium --view error -o error.png        psao against rtao, per pixel
+  dapple render room.glb --method rtao --view visibility -o visibility.exr";
 
 const QUALITY_EXAMPLES: &str = "\
 Examples:
@@ -212,8 +213,8 @@ pub(crate) struct RenderArgs {
     pub(crate) supersample: u32,
     #[command(flatten)]
     pub(crate) visibility: VisibilityArgs,
-    /// The PNG to write.
-    #[arg(short, long, value_name = "FILE.png")]
+    /// The PNG to write, or the EXR: 32-bit floats, linear and without tone mapping (R, G, B; for visibility and error Y).
+    #[arg(short, long, value_name = "FILE.png|FILE.exr")]
     pub(crate) output: PathBuf,
     /// Threads; 0 is one for each core.
     #[arg(long, value_name = "N", default_value_t = 0)]

@@ -7,6 +7,7 @@ mod args;
 mod bake;
 mod demo;
 mod eval;
+mod exr_file;
 mod inspect;
 mod light;
 mod page;

@@ -1,7 +1,5 @@
 //! A glTF file that is being edited: its JSON, of which only what is touched changes, and one binary part that grows.
 
-use std::path::Path;
-
 use anyhow::{Context, Result, bail};
 use serde_json::json;
 
@@ -106,10 +104,6 @@ impl Document {
     }
 
     /// The document itself. Its lists are not to be found there.
-    pub(crate) fn root(&self) -> &Object {
-        &self.root
-    }
-
     pub(crate) fn root_mut(&mut self) -> &mut Object {
         &mut self.root
     }
@@ -128,39 +122,20 @@ impl Document {
         self.push_value(List::BufferViews, &view)
     }
 
-    /// Whether an extension is named by `extensionsUsed`.
-    pub(crate) fn uses(&self, extension: &str) -> bool {
-        let used: Vec<String> = self.root.read("extensionsUsed").ok().flatten().unwrap_or_default();
-        used.iter().any(|name| name == extension)
-    }
-
-    /// The file's bytes, in the format that its name asks for: pieces to write one after the other.
-    pub(crate) fn into_file(self, path: &Path) -> Result<Vec<Vec<u8>>> {
-        let too_large = |bytes: u64| {
-            format!(
-                "{} would have {bytes} bytes, but a GLB is limited to 4 GiB; bake smaller or fewer textures, or parts of \
-                 the scene",
-                path.display()
+    /// The bytes of a GLB: pieces to write one after the other. `name` is for the message if it would be too large.
+    pub(crate) fn to_glb(&self, name: &str) -> Result<Vec<Vec<u8>>> {
+        let mut json = serde_json::to_vec(&self.json(None)?)?;
+        json.resize(json.len().next_multiple_of(4), b' ');
+        let mut bin = self.bin.clone();
+        bin.resize(bin.len().next_multiple_of(4), 0);
+        let bin_bytes = if bin.is_empty() { 0 } else { 8 + bin.len() as u64 };
+        let length = 20 + json.len() as u64 + bin_bytes + self.chunks.len() as u64;
+        let Ok(length) = u32::try_from(length) else {
+            bail!(
+                "{name} would have {length} bytes, but a GLB is limited to 4 GiB; bake smaller or fewer textures, or parts \
+                 of the scene"
             )
         };
-        let Document { root: mut document, mut lists, mut bin, chunks } = self;
-        if !bin.is_empty() {
-            let buffer = &mut lists[List::Buffers as usize][BIN];
-            let mut object = Object::parse(buffer)?;
-            object.set("byteLength", &bin.len())?;
-            *buffer = object.to_raw()?;
-        }
-        bin.resize(bin.len().next_multiple_of(4), 0);
-        for ((_, key), list) in List::ALL.iter().zip(&lists) {
-            if !list.is_empty() || document.has(key) {
-                document.set(key, list)?;
-            }
-        }
-        let mut json = serde_json::to_vec(&document)?;
-        json.resize(json.len().next_multiple_of(4), b' ');
-        let bin_bytes = if bin.is_empty() { 0 } else { 8 + bin.len() as u64 };
-        let length = 20 + json.len() as u64 + bin_bytes + chunks.len() as u64;
-        let Ok(length) = u32::try_from(length) else { bail!(too_large(length)) };
         let mut head = Vec::with_capacity(28 + json.len());
         head.extend(b"glTF");
         head.extend(2u32.to_le_bytes());
@@ -172,7 +147,37 @@ impl Document {
             head.extend((bin.len() as u32).to_le_bytes());
             head.extend(b"BIN\0");
         }
-        Ok(vec![head, bin, chunks])
+        Ok(vec![head, bin, self.chunks.clone()])
+    }
+
+    /// The bytes of a .gltf file that has everything in it.
+    pub(crate) fn to_gltf(&self) -> Result<Vec<u8>> {
+        use base64::Engine;
+        let data = base64::engine::general_purpose::STANDARD.encode(&self.bin);
+        Ok(serde_json::to_vec(&self.json(Some(format!("data:application/octet-stream;base64,{data}")))?)?)
+    }
+
+    /// The document with its lists, and where the bytes are if not in a GLB.
+    fn json(&self, uri: Option<String>) -> Result<Object> {
+        let mut document = self.root.clone();
+        for ((list, key), objects) in List::ALL.iter().zip(&self.lists) {
+            if objects.is_empty() && !document.has(key) {
+                continue;
+            }
+            if *list == List::Buffers && !self.bin.is_empty() {
+                let mut buffers = objects.clone();
+                let mut buffer = Object::parse(&buffers[BIN])?;
+                buffer.set("byteLength", &self.bin.len())?;
+                if let Some(uri) = &uri {
+                    buffer.set("uri", uri)?;
+                }
+                buffers[BIN] = buffer.to_raw()?;
+                document.set(key, &buffers)?;
+            } else {
+                document.set(key, objects)?;
+            }
+        }
+        Ok(document)
     }
 }
 

@@ -30,6 +30,30 @@ pub(crate) struct Report {
     pub(crate) copies: usize,
 }
 
+impl std::fmt::Display for Report {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut parts = Vec::new();
+        match self.images.as_slice() {
+            [] => {}
+            [(width, height)] => parts.push(format!("an image of {width}x{height}")),
+            [(width, height), ..] if self.images.iter().all(|size| *size == self.images[0]) => {
+                parts.push(format!("{} images of {width}x{height}", self.images.len()));
+            }
+            images => parts.push(format!("{} images", images.len())),
+        }
+        if let Some(texel_m) = self.texel_m {
+            parts.push(format!("texels of {:.3} m in new coordinates", texel_m));
+        }
+        if self.vertices > 0 {
+            parts.push(format!("{} vertices", self.vertices));
+        }
+        if self.copies > 0 {
+            parts.push(format!("{} meshes added, as instances differ", self.copies));
+        }
+        f.write_str(&parts.join(", "))
+    }
+}
+
 /// What is baked into.
 pub(crate) struct Target<'a> {
     pub(crate) document: Document,

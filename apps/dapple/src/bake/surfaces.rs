@@ -4,7 +4,7 @@ use dapple_scene::glam::{Mat3, Vec3};
 use dapple_scene::{Pose, Scene};
 use dapple_trace::Tracer;
 use dapple_trace::inside::{Solids, is_inside};
-use dapple_trace::rtao::{BentVisibility, RtaoParams, Site, trace_bent_with_progress, trace_visibility};
+use dapple_trace::rtao::{BentVisibility, RtaoParams, Site, SmoothSite, trace_bent};
 use dapple_trace::sampling::hash;
 use rayon::prelude::*;
 
@@ -16,6 +16,8 @@ pub(crate) struct Surfaces<'a> {
     solids: Solids,
     /// Whether an instance's map turns counter-clockwise into clockwise.
     mirrored: Vec<bool>,
+    /// Inverse transpose of each instance's map.
+    normal_maps: Vec<Mat3>,
     params: RtaoParams,
     /// Whether bent normals are wanted too.
     bent: bool,
@@ -39,6 +41,9 @@ pub(crate) struct Measured {
     /// Nobody can see this place: it lies inside of a body, or is cut out by its material's alpha.
     pub(crate) hidden: bool,
 }
+
+/// Least cosine between the normal that a place is shaded with and that of its face.
+const LEAST_SHADING_COSINE: f32 = 0.3;
 
 /// Fewest rays a place of one of several instances.
 const LEAST_RAYS: u32 = 8;
@@ -85,12 +90,12 @@ impl<'a> Surfaces<'a> {
     pub(crate) fn new(scene: &'a Scene, pose: &'a Pose, params: RtaoParams, bent: bool) -> Surfaces<'a> {
         let mirrored =
             pose.instances.iter().map(|posed| posed.world_from_mesh.matrix3.determinant() < 0.0).collect();
+        let normal_map = |posed: &dapple_scene::PosedInstance| {
+            Mat3::from(posed.world_from_mesh.matrix3).inverse().transpose()
+        };
+        let normal_maps = pose.instances.iter().map(normal_map).collect();
         let (tracer, solids) = (Tracer::new(scene, pose), Solids::new(scene));
-        Surfaces { scene, pose, tracer, solids, mirrored, params, bent }
-    }
-
-    pub(crate) fn tracer(&self) -> &Tracer {
-        &self.tracer
+        Surfaces { scene, pose, tracer, solids, mirrored, normal_maps, params, bent }
     }
 
     pub(crate) fn params(&self) -> RtaoParams {
@@ -137,29 +142,41 @@ impl<'a> Surfaces<'a> {
 
     /// Measures places with so many rays each, in parallel.
     pub(crate) fn measure(&self, places: &[Place], rays: u32) -> Vec<Measured> {
-        let sites: Vec<Site> = places.par_iter().with_min_len(256).map(|place| self.site(place)).collect();
+        let sites: Vec<SmoothSite> =
+            places.par_iter().with_min_len(256).map(|place| self.smooth_site(place)).collect();
         let params = RtaoParams { rays, ..self.params };
         let mut bent = vec![BentVisibility::default(); sites.len()];
-        if self.bent {
-            trace_bent_with_progress(&self.tracer, &sites, &params, &mut bent, &|_| {});
-        } else {
-            let mut visibility = vec![0.0; sites.len()];
-            trace_visibility(&self.tracer, &sites, &params, &mut visibility);
-            for (bent, visibility) in bent.iter_mut().zip(visibility) {
-                bent.visibility = visibility;
-            }
-        }
-        let finish = |directions: &mut Vec<Vec3>,
-                      ((place, site), bent): ((&Place, &Site), &BentVisibility)| {
-            Measured {
-                visibility: bent.visibility,
-                open_mesh: if self.bent { self.to_mesh(place, bent.open_world) } else { Vec3::ZERO },
-                hidden: site.normal_world == Vec3::ZERO
-                    || self.is_hole(place)
-                    || is_inside(self.scene, &self.tracer, &self.solids, site, directions),
-            }
-        };
+        trace_bent(&self.tracer, &sites, &params, &mut bent);
+        let finish =
+            |directions: &mut Vec<Vec3>,
+             ((place, smooth), bent): ((&Place, &SmoothSite), &BentVisibility)| {
+                let site = &smooth.site;
+                Measured {
+                    visibility: bent.visibility,
+                    open_mesh: if self.bent { self.to_mesh(place, bent.open_world) } else { Vec3::ZERO },
+                    hidden: site.normal_world == Vec3::ZERO
+                        || self.is_hole(place)
+                        || is_inside(self.scene, &self.tracer, &self.solids, site, directions),
+                }
+            };
         places.par_iter().zip(&sites).zip(&bent).with_min_len(64).map_init(Vec::new, finish).collect()
+    }
+
+    /// Where rays start at a place, and the normal that it is shaded with.
+    fn smooth_site(&self, place: &Place) -> SmoothSite {
+        let site = self.site(place);
+        let instance = place.instance as usize;
+        let posed = &self.pose.instances[instance];
+        let mesh = self.mesh_of(instance);
+        let normals = posed.deformed.as_ref().map_or(&mesh.normals, |deformed| &deformed.normals);
+        let [a, b, c] = mesh.triangles[place.triangle as usize].map(|v| normals[v as usize]);
+        let [v, w] = place.weights;
+        let between = a * (1.0 - v - w) + b * v + c * w;
+        let shading = (self.normal_maps[instance] * between).normalize_or_zero();
+        // A normal far from the face's is a slip of its maker.
+        let usable = shading.is_finite() && shading.dot(site.normal_world) > LEAST_SHADING_COSINE;
+        let shading_normal_world = if usable { shading } else { site.normal_world };
+        SmoothSite { site, shading_normal_world }
     }
 
     /// Measures places on several instances of one mesh, and gives the mean of what can be seen; `rays` are shared among them.

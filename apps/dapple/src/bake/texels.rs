@@ -7,10 +7,16 @@ use super::fill::Planes;
 use super::layout::Sheet;
 use super::plan::Copy;
 use super::raster::{Band, SUB, bands, rasterize};
+use super::stitch::stitch;
 use super::surfaces::{Place, Sum, Surfaces};
 
 /// Texels rasterised and measured at a time.
 const BAND_TEXELS: u32 = 1 << 17;
+
+/// How well a texel is known: measured on the surface that it lies on, nearest to where it lies, or not at all.
+const INSIDE: f32 = 1.0;
+const OUTSIDE: f32 = 0.05;
+const UNKNOWN: f32 = 0.02;
 
 /// The images of a sheet, as PNG files.
 pub(crate) struct Images {
@@ -30,11 +36,13 @@ pub(crate) fn bake_sheet(
     let bent = surfaces.measures_bent();
     let (width, height) = (sheet.width as usize, sheet.height as usize);
     let mut planes = Planes::new(width, height, if bent { 4 } else { 1 });
+    let mut weights = vec![UNKNOWN; width * height];
     for band in bands(sheet, (BAND_TEXELS / sheet.width.max(1)).clamp(1, 256)) {
-        measure_band(surfaces, copies, sheet, &band, &mut planes);
+        measure_band(surfaces, copies, sheet, &band, &mut planes, &mut weights);
         done(band.rows.len() as u32);
     }
     planes.fill(margin + 2, &[1.0, 0.0, 0.0, 0.0]);
+    stitch(surfaces, copies, sheet, &weights, &mut planes);
     let gray: Vec<u8> = planes.channels[0].iter().map(|&v| unorm8(v)).collect();
     let visibility = png(sheet, &gray, image::ExtendedColorType::L8)?;
     let bent = match bent {
@@ -65,20 +73,27 @@ fn png(sheet: &Sheet, bytes: &[u8], color: image::ExtendedColorType) -> Result<V
     Ok(file)
 }
 
-fn measure_band(surfaces: &Surfaces<'_>, copies: &[Copy], sheet: &Sheet, band: &Band, planes: &mut Planes) {
+fn measure_band(
+    surfaces: &Surfaces<'_>,
+    copies: &[Copy],
+    sheet: &Sheet,
+    band: &Band,
+    planes: &mut Planes,
+    weights: &mut [f32],
+) {
     if band.patches.is_empty() {
         return;
     }
     let rays = surfaces.params().rays;
-    let places = rasterize(sheet, band);
-    let mut sums = vec![Sum::default(); places.len()];
+    let found = rasterize(sheet, band);
+    let mut sums = vec![Sum::default(); found.len()];
     // By the number of places that share the rays of a texel, and by copy where several instances are its mean.
     for count in 1..=SUB * SUB {
         let rays = rays.div_ceil(count as u32);
         let (mut texels, mut alone): (Vec<u32>, Vec<Place>) = (Vec::new(), Vec::new());
         let mut shared: Vec<(u32, u32, Place)> = Vec::new();
-        for (texel, list) in (0u32..).zip(&places).filter(|(_, list)| list.len() == count) {
-            for on in list {
+        for (texel, list) in (0u32..).zip(&found).filter(|(_, found)| found.places.len() == count) {
+            for on in &list.places {
                 let patch = &sheet.patches[on.patch as usize];
                 let members = &copies[patch.copy as usize].members;
                 let place = Place { instance: members[0], triangle: patch.triangle, weights: on.weights };
@@ -105,9 +120,10 @@ fn measure_band(surfaces: &Surfaces<'_>, copies: &[Copy], sheet: &Sheet, band: &
         }
     }
     let first = band.rows.start as usize * planes.width;
-    for (at, sum) in sums.iter().enumerate() {
+    for (at, (sum, texel)) in sums.iter().zip(&found).enumerate() {
         let mean = sum.mean();
         if !mean.hidden {
+            weights[first + at] = if texel.is_outside { OUTSIDE } else { INSIDE };
             planes.known[first + at] = true;
             let open = mean.open_mesh;
             for (channel, value) in planes.channels.iter_mut().zip([mean.visibility, open.x, open.y, open.z])

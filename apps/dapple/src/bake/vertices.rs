@@ -11,7 +11,7 @@ use super::plan::{Copy, MeshPlan, Pool, place_in_triangle, triangles_of};
 use super::surfaces::{Place, Surfaces};
 
 /// Places measured on one triangle.
-const LEAST_PLACES: u32 = 3;
+const LEAST_PLACES: u32 = 4;
 const MOST_PLACES: f64 = 256.0;
 
 /// Places of all triangles of one copy; beyond, large triangles get fewer.
@@ -125,7 +125,8 @@ fn fit<const N: usize>(
     };
     for (t, (corners, &count)) in mesh.triangles.iter().zip(&counts).enumerate() {
         let area = surfaces.area_m2(instance as usize, t);
-        fit.triangle(corners.map(|v| welded.of_vertex[v as usize]), area);
+        let points = surfaces.corners_world(instance as usize, t).map(|p| p.as_dvec3());
+        fit.triangle(corners.map(|v| welded.of_vertex[v as usize]), points);
         for index in 0..count {
             let weights = place_in_triangle(u64::from(t as u32), index);
             places.push(Place { instance, triangle: t as u32, weights });

@@ -7,7 +7,7 @@ use dapple_scene::Mesh;
 use dapple_scene::glam::{Affine3A, DVec3, Quat, Vec3};
 
 use super::{
-    BentVisibility, RtaoParams, Site, trace_bent_with_progress, trace_visibility,
+    BentVisibility, RtaoParams, Site, SmoothSite, trace_bent, trace_visibility,
     trace_visibility_with_progress,
 };
 use crate::Tracer;
@@ -228,7 +228,9 @@ fn bent(mesh: Mesh, sites: &[Site], rays: u32, radius_m: f32) -> Vec<BentVisibil
     let tracer = Tracer::new(&scene, &pose);
     let params = RtaoParams { rays, radius_m, seed: 3 };
     let mut bent = vec![BentVisibility::default(); sites.len()];
-    trace_bent_with_progress(&tracer, sites, &params, &mut bent, &|_| {});
+    let smooth: Vec<SmoothSite> =
+        sites.iter().map(|s| SmoothSite { site: *s, shading_normal_world: s.normal_world }).collect();
+    trace_bent(&tracer, &smooth, &params, &mut bent);
     let mut plain = vec![f32::NAN; sites.len()];
     trace_visibility(&tracer, sites, &params, &mut plain);
     assert_eq!(bent.iter().map(|b| b.visibility).collect::<Vec<_>>(), plain, "the same rays");
@@ -275,5 +277,52 @@ fn bent_normal_beside_an_endless_wall() {
             let error = (b.open_world.as_dvec3() - expected).length();
             assert!(error < 2.0 * tolerance(16384), "wall at {d}: {}, not {expected}", b.open_world);
         }
+    }
+}
+
+/// About a tilted normal: 1 in the open, 0 in a box, and beside a wall what quadrature of the definition gives.
+#[test]
+fn visibility_about_shading_normals() {
+    let trace = |mesh: Mesh, at: Vec3, shading_normal_world: Vec3, rays: u32| {
+        let (scene, pose) = scene_of(mesh);
+        let tracer = Tracer::new(&scene, &pose);
+        let sites: Vec<SmoothSite> =
+            (0..8).map(|key| SmoothSite { site: site(at, Vec3::Y, key), shading_normal_world }).collect();
+        let mut bent = vec![BentVisibility::default(); 8];
+        let params = RtaoParams { rays, radius_m: UNLIMITED, seed: 3 };
+        trace_bent(&tracer, &sites, &params, &mut bent);
+        bent.into_iter().map(|b| b.visibility).collect::<Vec<f32>>()
+    };
+    let floor = quad(
+        Vec3::new(-9.0, 0.0, 9.0),
+        Vec3::new(9.0, 0.0, 9.0),
+        Vec3::new(9.0, 0.0, -9.0),
+        Vec3::new(-9.0, 0.0, -9.0),
+    );
+    let wall = quad(
+        Vec3::new(1.0, 0.0, -1e4),
+        Vec3::new(1.0, 0.0, 1e4),
+        Vec3::new(1.0, 1.0, 1e4),
+        Vec3::new(1.0, 1.0, -1e4),
+    );
+    for tilt in [0.0_f64, 0.2, -0.5, 0.9] {
+        let shading = DVec3::new(libm::sin(tilt), libm::cos(tilt), 0.0);
+        assert_eq!(trace(floor.clone(), Vec3::ZERO, shading.as_vec3(), 256), [1.0; 8], "{tilt}");
+        assert_eq!(trace(cube(), Vec3::splat(0.5), shading.as_vec3(), 256), [0.0; 8], "{tilt}");
+        // The wall hides what is less steep than its top seen along x.
+        let (mut open, mut all) = (0.0, 0.0);
+        let steps = 1000;
+        for i in 0..steps {
+            let y = (f64::from(i) + 0.5) / f64::from(steps);
+            for j in 0..2 * steps {
+                let around = (f64::from(j) + 0.5) / f64::from(steps) * PI;
+                let r = (1.0 - y * y).sqrt();
+                let d = DVec3::new(r * libm::cos(around), y, r * libm::sin(around));
+                let weight = d.dot(shading).max(0.0);
+                all += weight;
+                open += if d.x > 0.0 && d.y < d.x { 0.0 } else { weight };
+            }
+        }
+        expect(&trace(wall.clone(), Vec3::ZERO, shading.as_vec3(), 16384), open / all, 4096, "tilted wall");
     }
 }
