@@ -1,5 +1,6 @@
 //! Command-line arguments.
 
+pub(crate) mod bake;
 mod eval;
 mod verbs;
 mod view;
@@ -11,6 +12,7 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
 
+pub(crate) use bake::BakeArgs;
 pub(crate) use eval::{EvalArgs, Options};
 pub(crate) use verbs::{CompareArgs, DiffArgs, ErrorMap, EvalVerb, JudgeArgs};
 pub(crate) use view::{Preset, ViewArgs, ViewKind};
@@ -35,6 +37,9 @@ pub(crate) enum Command {
     /// Compare reconstructions of visibility over all surfaces of a scene, or near thin walls, with traced truth.
     #[command(after_help = QUALITY_EXAMPLES)]
     Quality(QualityArgs),
+    /// Write ray-traced visibility into a scene's file, as a texture or at vertices, or into one of points.
+    #[command(after_help = bake::BAKE_EXAMPLES)]
+    Bake(BakeArgs),
     /// Write a built-in scene as a GLB that any glTF viewer opens.
     #[command(after_help = SCENE_EXAMPLES)]
     Scene(SceneArgs),
@@ -57,7 +62,8 @@ Examples:
   dapple render room.glb -o room.png
   dapple render --builtin atrium --time 4 --camera eye=2,1.7,5,target=0,1,0,fov=60 --method rtao -o truth.png
   dapple render city.glb --method psao --points 256 --radius auto --view visibility -o visibility.png
-  dapple render --builtin atrium --view error -o error.png        psao against rtao, per pixel";
+  dapple render --builtin atrium --view error -o error.png        psao against rtao, per pixel
+  dapple render room.glb --method rtao --view visibility -o visibility.exr";
 
 const QUALITY_EXAMPLES: &str = "\
 Examples:
@@ -150,8 +156,8 @@ pub(crate) struct RenderArgs {
     pub(crate) supersample: u32,
     #[command(flatten)]
     pub(crate) visibility: VisibilityArgs,
-    /// The PNG to write.
-    #[arg(short, long, value_name = "FILE.png")]
+    /// The PNG to write, or the EXR: 32-bit floats, linear and without tone mapping (R, G, B; for visibility and error Y).
+    #[arg(short, long, value_name = "FILE.png|FILE.exr")]
     pub(crate) output: PathBuf,
     /// Threads; 0 is one for each core.
     #[arg(long, value_name = "N", default_value_t = 0)]

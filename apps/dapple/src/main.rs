@@ -1,11 +1,13 @@
-//! The command `dapple`: evaluate, render, show, record and serve scenes.
+//! The command `dapple`: evaluate, render, bake, show, record and serve scenes.
 
 #[macro_use]
 mod say;
 
 mod args;
+mod bake;
 mod demo;
 mod eval;
+mod exr_file;
 mod inspect;
 mod judge;
 mod light;
@@ -55,6 +57,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Render(args) => args.threads,
         Command::Record(args) => args.threads,
         Command::Quality(args) => args.threads,
+        Command::Bake(args) => args.threads,
         Command::Scene(_) | Command::Inspect(_) | Command::Demo(_) | Command::View(_) => 0,
     };
     if threads > 1024 {
@@ -65,6 +68,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Quality(args) => eval::quality::run(&args),
+        Command::Bake(args) => bake::run(&args),
         Command::Scene(args) => scene_command::run(&args),
         Command::Record(args) => record::run(&args),
         Command::Inspect(args) => inspect::run(&args),

@@ -16,6 +16,36 @@ use crate::judge::Judge;
 
 /// Writes a whole file: into a neighbour first, then renamed over the old one.
 pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_parts(path, &[bytes])
+}
+
+/// Fails where a file could not be written, before the work that would be lost.
+pub(crate) fn check_writable(path: &Path) -> Result<()> {
+    let refuse = |error: std::io::Error| anyhow::anyhow!("cannot write {}: {error}", path.display());
+    if path.is_dir() {
+        anyhow::bail!("cannot write {}: it is a folder", path.display());
+    }
+    let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match std::fs::metadata(folder) {
+        Ok(found) if !found.is_dir() => {
+            anyhow::bail!("cannot write {}: {} is no folder", path.display(), folder.display())
+        }
+        // It will be made.
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+        Err(error) => return Err(refuse(error)),
+        Ok(_) => {}
+    }
+    if std::fs::metadata(path).is_ok_and(|m| !m.is_file()) {
+        return Ok(());
+    }
+    let mut trial = path.file_name().unwrap_or_default().to_owned();
+    trial.push(format!(".{}.tmp", std::process::id()));
+    let trial = path.with_file_name(trial);
+    std::fs::File::create(&trial).and_then(|_| std::fs::remove_file(&trial)).map_err(refuse)
+}
+
+/// As [`write_file`], of bytes that follow each other.
+pub(crate) fn write_parts(path: &Path, parts: &[&[u8]]) -> Result<()> {
     if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder)
             .with_context(|| format!("cannot create the folder {}", folder.display()))?;
@@ -24,14 +54,16 @@ pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
     let resolved = std::fs::canonicalize(path);
     let path = resolved.as_deref().unwrap_or(path);
     if std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
-        return std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()));
+        let written = std::fs::File::create(path)
+            .and_then(|mut file| parts.iter().try_for_each(|part| file.write_all(part)));
+        return written.with_context(|| format!("cannot write {}", path.display()));
     }
     let name = path.file_name().with_context(|| format!("{} names no file", path.display()))?;
     let mut partial = name.to_owned();
     partial.push(format!(".{}.tmp", std::process::id()));
     let partial = path.with_file_name(partial);
     let written = std::fs::File::create(&partial).and_then(|mut file| {
-        file.write_all(bytes)?;
+        parts.iter().try_for_each(|part| file.write_all(part))?;
         file.sync_all()
     });
     let moved = written.and_then(|()| std::fs::rename(&partial, path));

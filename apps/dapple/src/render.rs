@@ -2,11 +2,14 @@
 
 use anyhow::{Result, bail};
 use dapple_client::{Client, Drawn, PictureParams, Reconstruction, draw};
-use dapple_render::compose::{ErrorKind, NormalSpace, PointsView, draw_points, resolve_plane, view_error};
+use dapple_render::compose::{
+    ErrorKind, NormalSpace, PointsView, ResolvedPlane, draw_points, resolve_plane, view_error,
+};
 use dapple_render::compose::{view_normals, view_visibility};
 use dapple_render::image::{Rgb8Image, ToneMap};
 use dapple_render::psao::{Hat, Kernel};
 use dapple_scene::PosedCamera;
+use dapple_scene::glam::Vec3;
 use dapple_server::{Progress, Server, ServerConfig};
 use dapple_stream::Limits;
 use dapple_trace::Tracer;
@@ -15,6 +18,7 @@ use dapple_trace::psao::update::UpdateParams;
 use dapple_trace::rtao::{RtaoParams, trace_visibility_with_progress};
 
 use crate::args::{RenderArgs, RenderMethod, View};
+use crate::exr_file::{write_gray, write_rgb};
 use crate::picture::{sites, write_png};
 use crate::progress::Bar;
 use crate::source::{self, Loaded};
@@ -34,30 +38,86 @@ pub(crate) fn run(args: &RenderArgs) -> Result<()> {
     let wheel = Bar::spinner("drawing");
     let drawn = draw(scene, &camera, args.time, &params)?;
     drop(wheel);
-    let picture = match args.view {
-        View::Normal => view_normals(&drawn.gbuffer, scene, &drawn.pose, NormalSpace::World),
-        View::Points => points_view(args, &loaded, &drawn, &camera)?,
+    let (path, width, height) = (&args.output, drawn.gbuffer.width, drawn.gbuffer.height);
+    match numbers(args, &loaded, &drawn)? {
+        Some(Numbers::Rgb(pixels)) => write_rgb(path, width, height, &pixels)?,
+        Some(Numbers::Gray(values)) => write_gray(path, width, height, &values)?,
+        None => write_png(path, width, height, &picture(args, &loaded, &drawn, &camera)?.pixels)?,
+    }
+    say!("wrote {}", path.display());
+    Ok(())
+}
+
+/// What an EXR holds.
+enum Numbers {
+    Rgb(Vec<Vec3>),
+    Gray(Vec<f32>),
+}
+
+fn is_exr(args: &RenderArgs) -> bool {
+    args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"))
+}
+
+/// The picture as 8-bit colours.
+fn picture(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn, camera: &PosedCamera) -> Result<Rgb8Image> {
+    Ok(match args.view {
+        View::Normal => view_normals(&drawn.gbuffer, &loaded.scene, &drawn.pose, NormalSpace::World),
+        View::Points => points_view(args, loaded, drawn, camera)?,
         View::Beauty => {
-            let visibility = visibility(args, args.method, &loaded, &drawn)?;
+            let visibility = visibility(args, args.method, loaded, drawn)?;
             drawn.compose(visibility.as_deref())?.to_rgb8(&ToneMap::default())
         }
         View::Visibility => {
-            let visibility = visibility(args, args.method, &loaded, &drawn)?;
-            view_visibility(&drawn.gbuffer, &visibility.unwrap_or_else(|| open(&drawn)))?
+            let visibility = visibility(args, args.method, loaded, drawn)?;
+            view_visibility(&drawn.gbuffer, &visibility.unwrap_or_else(|| open(drawn)))?
         }
         View::Error => {
-            let truth =
-                visibility(args, RenderMethod::Rtao, &loaded, &drawn)?.unwrap_or_else(|| open(&drawn));
-            let test = visibility(args, args.method, &loaded, &drawn)?.unwrap_or_else(|| open(&drawn));
-            let truth = resolve_plane(&drawn.gbuffer, &truth, 1.0)?;
-            let test = resolve_plane(&drawn.gbuffer, &test, 1.0)?;
+            let [truth, test] = truth_and_test(args, loaded, drawn)?;
             view_error(&truth.values, &test.values, &truth.coverage, ErrorKind::Signed)?
         }
-    };
-    let Rgb8Image { width, height, pixels } = &picture;
-    write_png(&args.output, *width, *height, pixels)?;
-    say!("wrote {}", args.output.display());
-    Ok(())
+    })
+}
+
+/// The numbers behind the picture, if those are asked for: radiance, visibility (1 where there is nothing), normals in the
+/// world (0 where there is nothing), or how much visibility is too high.
+fn numbers(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn) -> Result<Option<Numbers>> {
+    if !is_exr(args) {
+        return Ok(None);
+    }
+    Ok(Some(match args.view {
+        View::Beauty => {
+            let visibility = visibility(args, args.method, loaded, drawn)?;
+            Numbers::Rgb(drawn.compose(visibility.as_deref())?.pixels)
+        }
+        View::Visibility => {
+            let visibility = visibility(args, args.method, loaded, drawn)?.unwrap_or_else(|| open(drawn));
+            Numbers::Gray(resolve_plane(&drawn.gbuffer, &visibility, 1.0)?.values.values)
+        }
+        View::Normal => {
+            let normals = drawn.gbuffer.map_surfaces(&loaded.scene, &drawn.pose, |_, surface| {
+                surface.map_or(Vec3::ZERO, |s| s.normal_shading_world)
+            });
+            let scale = 1.0 / (args.supersample * args.supersample) as f32;
+            let sum = |samples: &mut dyn Iterator<Item = usize>| {
+                samples.fold(Vec3::ZERO, |sum, i| sum + normals[i])
+            };
+            Numbers::Rgb(drawn.gbuffer.map_pixels(|samples| sum(samples) * scale))
+        }
+        View::Error => {
+            let [truth, test] = truth_and_test(args, loaded, drawn)?;
+            let pairs = test.values.values.iter().zip(&truth.values.values);
+            Numbers::Gray(pairs.map(|(test, truth)| test - truth).collect())
+        }
+        // Refused by `check`.
+        View::Points => return Ok(None),
+    }))
+}
+
+/// Visibility by rays at every pixel, and by the method.
+fn truth_and_test(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn) -> Result<[ResolvedPlane; 2]> {
+    let truth = visibility(args, RenderMethod::Rtao, loaded, drawn)?.unwrap_or_else(|| open(drawn));
+    let test = visibility(args, args.method, loaded, drawn)?.unwrap_or_else(|| open(drawn));
+    Ok([resolve_plane(&drawn.gbuffer, &truth, 1.0)?, resolve_plane(&drawn.gbuffer, &test, 1.0)?])
 }
 
 fn check(args: &RenderArgs) -> Result<()> {
@@ -65,8 +125,11 @@ fn check(args: &RenderArgs) -> Result<()> {
         bail!("--rays is {}, must be 1 to 65536", args.rays);
     }
     let extension = args.output.extension().unwrap_or_default();
-    if !extension.eq_ignore_ascii_case("png") && !extension.is_empty() {
-        bail!("{} would hold a PNG: name it .png", args.output.display());
+    if !extension.eq_ignore_ascii_case("png") && !is_exr(args) && !extension.is_empty() {
+        bail!("{} would hold a picture: name it .png or .exr", args.output.display());
+    }
+    if args.view == View::Points && is_exr(args) {
+        bail!("--view points is a picture of discs: write it to a .png");
     }
     if !args.time.is_finite() {
         bail!("--time must be a finite number of seconds");

@@ -19,22 +19,55 @@ pub(crate) struct Loaded {
     pub(crate) title: String,
 }
 
-/// Loads what the arguments name; `fallback` is the built-in scene and detail used when they name nothing.
-pub(crate) fn load(choice: &SceneChoice, fallback: Option<(&str, f32)>) -> Result<Loaded> {
+/// A scene's file.
+pub(crate) struct Source {
+    /// Name of the file, without its folder.
+    pub(crate) name: String,
+    pub(crate) bytes: Vec<u8>,
+    /// Where files beside it are; nowhere for a built-in scene.
+    pub(crate) folder: Option<Folder>,
+    /// What a user should call it.
+    pub(crate) title: String,
+}
+
+/// Reads the file that the arguments name, or makes the built-in scene.
+pub(crate) fn read(choice: &SceneChoice) -> Result<Source> {
+    read_or(choice, None)
+}
+
+fn read_or(choice: &SceneChoice, fallback: Option<(&str, f32)>) -> Result<Source> {
     if choice.scene.is_some() && choice.detail.is_some() {
         bail!(
             "--detail is for built-in scenes; {} is a file",
             choice.scene.as_deref().unwrap_or(Path::new("")).display()
         );
     }
-    let (mut scene, title) = match (&choice.scene, &choice.builtin, fallback) {
-        (Some(path), _, _) => (load_file(path)?, path.display().to_string()),
-        (None, Some(name), _) => load_builtin(name, choice.detail.unwrap_or(1.0))?,
-        (None, None, Some((name, detail))) => load_builtin(name, choice.detail.unwrap_or(detail))?,
+    match (&choice.scene, &choice.builtin, fallback) {
+        (Some(path), _, _) => read_file(path),
+        (None, Some(name), _) => make_builtin(name, choice.detail.unwrap_or(1.0)),
+        (None, None, Some((name, detail))) => make_builtin(name, choice.detail.unwrap_or(detail)),
         (None, None, None) => bail!("no scene given: name a .gltf, .glb or .obj file, or --builtin atrium"),
+    }
+}
+
+/// Loads what the arguments name; `fallback` is the built-in scene and detail used when they name nothing.
+pub(crate) fn load(choice: &SceneChoice, fallback: Option<(&str, f32)>) -> Result<Loaded> {
+    let Source { name, bytes, folder, title } = read_or(choice, fallback)?;
+    let wheel = Bar::spinner(&format!("loading {title}"));
+    let mut scene = match &folder {
+        Some(folder) => dapple_scene::load(&name, &bytes, folder)?,
+        None => dapple_scene::load(&name, &bytes, &dapple_scene::NoFiles)
+            .with_context(|| format!("the {title} does not load"))?,
     };
+    drop(wheel);
+    prepare(&mut scene, choice, &title)?;
+    Ok(Loaded { scene: Arc::new(scene), title })
+}
+
+/// Chooses the animation, tells the loader's warnings, and refuses a scene without triangles.
+pub(crate) fn prepare(scene: &mut Scene, choice: &SceneChoice, title: &str) -> Result<()> {
     if let Some(animation) = &choice.animation {
-        let animation = find_animation(&scene, animation)?;
+        let animation = find_animation(scene, animation)?;
         scene.set_active_animation(Some(animation));
     }
     for warning in &scene.warnings {
@@ -43,24 +76,22 @@ pub(crate) fn load(choice: &SceneChoice, fallback: Option<(&str, f32)>) -> Resul
     if scene.triangle_count() == 0 {
         bail!("{title} has no triangles: there is nothing to light");
     }
-    Ok(Loaded { scene: Arc::new(scene), title })
+    Ok(())
 }
 
-fn load_builtin(name: &str, detail: f32) -> Result<(Scene, String)> {
+fn make_builtin(name: &str, detail: f32) -> Result<Source> {
     let _wheel = Bar::spinner(&format!("making {name}"));
     let bytes = builtin::glb(name, detail)?;
-    let scene = dapple_scene::load(&format!("{name}.glb"), &bytes, &dapple_scene::NoFiles)
-        .with_context(|| format!("the built-in scene {name} does not load"))?;
-    Ok((scene, format!("built-in {name}, detail {detail}")))
+    let title = format!("built-in {name}, detail {detail}");
+    Ok(Source { name: format!("{name}.glb"), bytes, folder: None, title })
 }
 
-fn load_file(path: &Path) -> Result<Scene> {
-    let _wheel = Bar::spinner(&format!("loading {}", path.display()));
+fn read_file(path: &Path) -> Result<Source> {
     let bytes = read_limited(path, MAX_SCENE_BYTES)
         .with_context(|| format!("cannot read the scene {}", path.display()))?;
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-    Ok(dapple_scene::load(&name, &bytes, &Folder(folder))?)
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let folder = Folder(path.parent().unwrap_or(Path::new("")).to_owned());
+    Ok(Source { name, bytes, folder: Some(folder), title: path.display().to_string() })
 }
 
 fn find_animation(scene: &Scene, wanted: &str) -> Result<u32> {
@@ -131,7 +162,7 @@ pub(crate) fn radius_of(scene: &Scene, radius: Radius) -> Result<(f32, f32)> {
 }
 
 /// Reads files beside a scene.
-struct Folder(PathBuf);
+pub(crate) struct Folder(PathBuf);
 
 impl Files for Folder {
     fn read(&self, uri: &str, limit_bytes: u64) -> std::io::Result<Vec<u8>> {

@@ -24,7 +24,7 @@ mod surface;
 pub use animation::{Animation, Channel, ChannelTarget, Interpolation};
 pub use camera::{Camera, PosedCamera, Projection};
 pub use light::{Light, LightKind, PosedLight};
-pub use load::{Files, LoadError, NoFiles, load};
+pub use load::{Files, LoadError, MeshOrigin, NoFiles, Origins, load, load_with_origins, read_reference};
 pub use material::{AlphaMode, Filter, Image, Material, NormalTexture, Texture, TextureRef, Wrap};
 pub use mesh::{Mesh, MorphTarget, Part, SkinInfluences};
 pub use path::{CameraPath, CameraSource};

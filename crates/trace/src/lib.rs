@@ -8,6 +8,7 @@
 //! give the same bits on any number of threads.
 
 pub mod bvh;
+pub mod inside;
 pub mod psao;
 pub mod rtao;
 pub mod sampling;

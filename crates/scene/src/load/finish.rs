@@ -29,8 +29,8 @@ pub(super) struct Placement {
     pub(super) receives: bool,
 }
 
-/// Makes the scene consistent as its documentation promises.
-pub(super) fn finish(context: &Context<'_>, draft: Draft) -> Result<Scene, LoadError> {
+/// Makes the scene consistent as its documentation promises; also gives the index in the file of each node.
+pub(super) fn finish(context: &Context<'_>, draft: Draft) -> Result<(Scene, Vec<u32>), LoadError> {
     let order = parents_first(context, &draft)?;
     let Draft { mut scene, labels, mut placements, .. } = draft;
     let mut new_index = vec![0_u32; order.len()];
@@ -76,7 +76,7 @@ pub(super) fn finish(context: &Context<'_>, draft: Draft) -> Result<Scene, LoadE
         });
     }
     set_rest_scale(context, &mut scene, &label_of)?;
-    Ok(scene)
+    Ok((scene, order))
 }
 
 /// The nodes ordered parents first, otherwise as in the file.

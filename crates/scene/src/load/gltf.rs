@@ -14,7 +14,7 @@ mod parse;
 use gltf::json::Root;
 
 use super::context::Context;
-use super::{LoadError, finish};
+use super::{LoadError, Origins, finish};
 use crate::Scene;
 use document::Document;
 
@@ -28,24 +28,29 @@ const SUPPORTED: [&str; 5] = [
 ];
 
 /// Reads a binary glTF file.
-pub(super) fn load_glb(context: &Context<'_>, bytes: &[u8]) -> Result<Scene, LoadError> {
+pub(super) fn load_glb(context: &Context<'_>, bytes: &[u8]) -> Result<(Scene, Origins), LoadError> {
     let glb = parse::container(context, bytes)?;
     load_json(context, &glb.json, glb.bin.as_deref())
 }
 
 /// Reads glTF JSON with the binary chunk of a GLB container, if any.
-pub(super) fn load_json(context: &Context<'_>, json: &[u8], bin: Option<&[u8]>) -> Result<Scene, LoadError> {
+pub(super) fn load_json(
+    context: &Context<'_>,
+    json: &[u8],
+    bin: Option<&[u8]>,
+) -> Result<(Scene, Origins), LoadError> {
     let root = parse::root(context, json)?;
     check_extensions(context, &root)?;
     let document = Document::new(context, &root, bin)?;
 
     let mut draft = finish::Draft::default();
     material::read(&document, &mut draft.scene)?;
-    mesh::read(&document, &mut draft.scene)?;
+    let meshes = mesh::read(&document, &mut draft.scene)?;
     node::read(&document, &mut draft)?;
     animation::read(&document, &mut draft)?;
     document.warn_of_unused_flaws();
-    finish::finish(context, draft)
+    let (scene, nodes) = finish::finish(context, draft)?;
+    Ok((scene, Origins { nodes, meshes }))
 }
 
 fn check_extensions(context: &Context<'_>, root: &Root) -> Result<(), LoadError> {

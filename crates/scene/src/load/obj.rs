@@ -78,7 +78,7 @@ pub(super) fn load(context: &Context<'_>, bytes: &[u8], stem: &str) -> Result<Sc
         let (node, mesh) = (object as u32, object as u32);
         draft.placements.push(Placement { node, mesh, skin: None, casts: true, receives: true });
     }
-    finish::finish(context, draft)
+    finish::finish(context, draft).map(|(scene, _)| scene)
 }
 
 /// Vectors out of a flat list.

@@ -1,11 +1,15 @@
 //! Closed forms of visibility, and independence of threads and of other sites.
 
+use std::f64::consts::PI;
 use std::sync::Mutex;
 
 use dapple_scene::Mesh;
-use dapple_scene::glam::{Affine3A, Quat, Vec3};
+use dapple_scene::glam::{Affine3A, DVec3, Quat, Vec3};
 
-use super::{RtaoParams, Site, trace_visibility, trace_visibility_with_progress};
+use super::{
+    BentVisibility, RtaoParams, Site, SmoothSite, trace_bent, trace_visibility,
+    trace_visibility_with_progress,
+};
 use crate::Tracer;
 use crate::test_support::{Random, cube, disc, joined, mesh, quad, scene, scene_of, sphere};
 
@@ -217,4 +221,108 @@ fn parameters_out_of_range() {
     let most = visibility(lid, &sites[..1], u32::MAX, UNLIMITED)[0];
     assert_eq!(most, (most * 65536.0).round() / 65536.0);
     assert!(visibility(mesh(vec![], vec![]), &[], 16, 1.0).is_empty());
+}
+
+fn bent(mesh: Mesh, sites: &[Site], rays: u32, radius_m: f32) -> Vec<BentVisibility> {
+    let (scene, pose) = scene_of(mesh);
+    let tracer = Tracer::new(&scene, &pose);
+    let params = RtaoParams { rays, radius_m, seed: 3 };
+    let mut bent = vec![BentVisibility::default(); sites.len()];
+    let smooth: Vec<SmoothSite> =
+        sites.iter().map(|s| SmoothSite { site: *s, shading_normal_world: s.normal_world }).collect();
+    trace_bent(&tracer, &smooth, &params, &mut bent);
+    let mut plain = vec![f32::NAN; sites.len()];
+    trace_visibility(&tracer, sites, &params, &mut plain);
+    assert_eq!(bent.iter().map(|b| b.visibility).collect::<Vec<_>>(), plain, "the same rays");
+    bent
+}
+
+/// Open directions are those outside of the cone of half angle α about the normal: their mean is 2/3 cos³ α along it.
+#[test]
+fn bent_normal_under_a_disc() {
+    for (r, h) in [(1.0_f64, 1.0_f64), (0.3, 1.0), (4.0, 1.0)] {
+        let expected = 2.0 / 3.0 * (h / (r * r + h * h).sqrt()).powi(3);
+        for b in bent(disc(Vec3::Y * h as f32, r as f32, 512), &at_origin(), 16384, UNLIMITED) {
+            let error = (b.open_world.as_dvec3() - DVec3::new(0.0, expected, 0.0)).length();
+            assert!(error < tolerance(16384), "disc {r} at {h}: {}, not {expected} upwards", b.open_world);
+        }
+    }
+    for b in bent(Mesh::default(), &at_origin(), 4096, UNLIMITED) {
+        assert!(b.open_world.distance(Vec3::new(0.0, 2.0 / 3.0, 0.0)) < 1e-3, "{}", b.open_world);
+    }
+    for b in bent(cube(), &[site(Vec3::splat(0.5), Vec3::Y, 0)], 64, UNLIMITED) {
+        assert_eq!(b, BentVisibility { visibility: 0.0, open_world: Vec3::ZERO });
+    }
+}
+
+/// An endless wall of height H at distance d blocks a wedge of angle β = atan(H / d) about the line at its foot. With ψ the
+/// angle to that line, ∫ ω (n · ω) dω over the wedge is 4/3 (sin² β / 2, β / 2 − sin 2β / 4): across and up.
+#[test]
+fn bent_normal_beside_an_endless_wall() {
+    let height = 3.0_f64;
+    for d in [1e-3_f64, 0.5, 3.0, 20.0] {
+        let half = (1e4 * d).max(100.0) as f32;
+        let (x, top) = (d as f32, height as f32);
+        let wall = quad(
+            Vec3::new(x, 0.0, -half),
+            Vec3::new(x, 0.0, half),
+            Vec3::new(x, top, half),
+            Vec3::new(x, top, -half),
+        );
+        let angle = libm::atan(height / d);
+        let across = 4.0 / 3.0 / PI * 0.5 * libm::sin(angle) * libm::sin(angle);
+        let up = 4.0 / 3.0 / PI * (0.5 * angle - 0.25 * libm::sin(2.0 * angle));
+        let expected = DVec3::new(-across, 2.0 / 3.0 - up, 0.0);
+        for b in bent(wall, &at_origin(), 16384, UNLIMITED) {
+            let error = (b.open_world.as_dvec3() - expected).length();
+            assert!(error < 2.0 * tolerance(16384), "wall at {d}: {}, not {expected}", b.open_world);
+        }
+    }
+}
+
+/// About a tilted normal: 1 in the open, 0 in a box, and beside a wall what quadrature of the definition gives.
+#[test]
+fn visibility_about_shading_normals() {
+    let trace = |mesh: Mesh, at: Vec3, shading_normal_world: Vec3, rays: u32| {
+        let (scene, pose) = scene_of(mesh);
+        let tracer = Tracer::new(&scene, &pose);
+        let sites: Vec<SmoothSite> =
+            (0..8).map(|key| SmoothSite { site: site(at, Vec3::Y, key), shading_normal_world }).collect();
+        let mut bent = vec![BentVisibility::default(); 8];
+        let params = RtaoParams { rays, radius_m: UNLIMITED, seed: 3 };
+        trace_bent(&tracer, &sites, &params, &mut bent);
+        bent.into_iter().map(|b| b.visibility).collect::<Vec<f32>>()
+    };
+    let floor = quad(
+        Vec3::new(-9.0, 0.0, 9.0),
+        Vec3::new(9.0, 0.0, 9.0),
+        Vec3::new(9.0, 0.0, -9.0),
+        Vec3::new(-9.0, 0.0, -9.0),
+    );
+    let wall = quad(
+        Vec3::new(1.0, 0.0, -1e4),
+        Vec3::new(1.0, 0.0, 1e4),
+        Vec3::new(1.0, 1.0, 1e4),
+        Vec3::new(1.0, 1.0, -1e4),
+    );
+    for tilt in [0.0_f64, 0.2, -0.5, 0.9] {
+        let shading = DVec3::new(libm::sin(tilt), libm::cos(tilt), 0.0);
+        assert_eq!(trace(floor.clone(), Vec3::ZERO, shading.as_vec3(), 256), [1.0; 8], "{tilt}");
+        assert_eq!(trace(cube(), Vec3::splat(0.5), shading.as_vec3(), 256), [0.0; 8], "{tilt}");
+        // The wall hides what is less steep than its top seen along x.
+        let (mut open, mut all) = (0.0, 0.0);
+        let steps = 1000;
+        for i in 0..steps {
+            let y = (f64::from(i) + 0.5) / f64::from(steps);
+            for j in 0..2 * steps {
+                let around = (f64::from(j) + 0.5) / f64::from(steps) * PI;
+                let r = (1.0 - y * y).sqrt();
+                let d = DVec3::new(r * libm::cos(around), y, r * libm::sin(around));
+                let weight = d.dot(shading).max(0.0);
+                all += weight;
+                open += if d.x > 0.0 && d.y < d.x { 0.0 } else { weight };
+            }
+        }
+        expect(&trace(wall.clone(), Vec3::ZERO, shading.as_vec3(), 16384), open / all, 4096, "tilted wall");
+    }
 }

@@ -8,7 +8,7 @@ use gltf::json::{Index, validation::Checked};
 use super::accessor::{Allowed, Elements};
 use super::document::{Document, label, name_of};
 use crate::load::context::is_usable;
-use crate::load::{LoadError, accumulate, normals};
+use crate::load::{LoadError, MeshOrigin, accumulate, normals};
 use crate::{Material, Mesh, MorphTarget, Scene, SkinInfluences};
 
 use ComponentType::{F32, I8, I16, U8, U16, U32};
@@ -22,18 +22,20 @@ const JOINTS: Allowed = Allowed::new(&[Type::Vec4], &[U8, U16]);
 const WEIGHTS: Allowed = Allowed::new(&[Type::Vec4], &[F32, U8, U16]);
 const INDICES: Allowed = Allowed::new(&[Type::Scalar], &[U8, U16, U32]);
 
-/// Reads all meshes into `scene`, and adds a default material if one is needed.
-pub(super) fn read(document: &Document<'_>, scene: &mut Scene) -> Result<(), LoadError> {
+/// Reads all meshes into `scene`, and adds a default material if one is needed. Tells where the meshes' parts come from.
+pub(super) fn read(document: &Document<'_>, scene: &mut Scene) -> Result<Vec<MeshOrigin>, LoadError> {
     let default_material = scene.materials.len() as u32;
+    let mut origins = Vec::with_capacity(document.root.meshes.len());
     for (i, source) in document.root.meshes.iter().enumerate() {
-        let mesh = read_mesh(document, source, i, default_material)?;
+        let (mesh, origin) = read_mesh(document, source, i, default_material)?;
         scene.meshes.push(mesh);
+        origins.push(origin);
     }
     let uses_default = |mesh: &Mesh| mesh.parts.iter().any(|part| part.material == default_material);
     if scene.meshes.iter().any(uses_default) || (scene.materials.is_empty() && !scene.meshes.is_empty()) {
         scene.materials.push(Material { name: "default".to_owned(), ..Material::default() });
     }
-    Ok(())
+    Ok(origins)
 }
 
 fn read_mesh(
@@ -41,9 +43,10 @@ fn read_mesh(
     source: &Source,
     index: usize,
     default_material: u32,
-) -> Result<Mesh, LoadError> {
+) -> Result<(Mesh, MeshOrigin), LoadError> {
     let context = document.context;
     let at = label("mesh", index, &source.name);
+    let mut origin = MeshOrigin::default();
     let mut mesh = Mesh { name: name_of("mesh", index, &source.name), ..Mesh::default() };
     let mut target_counts = Vec::new();
     for (p, primitive) in source.primitives.iter().enumerate() {
@@ -51,7 +54,9 @@ fn read_mesh(
         let material = document
             .resolve_optional(primitive.material, "material", &at, "material")?
             .map_or(default_material, |material| material as u32);
-        let Some(piece) = (Reader { document, primitive, at: &at }).piece()? else { continue };
+        let Some((piece, vertices)) = (Reader { document, primitive, at: &at }).piece()? else { continue };
+        origin.primitives.push(p as u32);
+        origin.vertices.extend(vertices);
         target_counts.push(piece.morph_targets.len());
         accumulate::append(context, &at, &mut mesh, piece, material)?;
     }
@@ -77,7 +82,7 @@ fn read_mesh(
     }
     weights.resize(mesh.morph_targets.len(), 0.0);
     mesh.morph_weights = weights;
-    Ok(mesh)
+    Ok((mesh, origin))
 }
 
 fn vertex_bytes(mesh: &Mesh) -> u64 {
@@ -127,8 +132,9 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// The triangles of the primitive, or `None` (with a warning) if there is nothing to draw.
-    fn piece(&self) -> Result<Option<Mesh>, LoadError> {
+    /// The triangles of the primitive and the accessor element of each vertex, or `None` (with a warning) if there is
+    /// nothing to draw.
+    fn piece(&self) -> Result<Option<(Mesh, Vec<u32>)>, LoadError> {
         let (context, at) = (self.document.context, self.at);
         let mode = match self.primitive.mode {
             Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
@@ -149,13 +155,14 @@ impl Reader<'_> {
             context.warn(format!("{at}: left out, as it has no triangles"));
             return Ok(None);
         }
-        let (used, triangles) = used_vertices(positions.count, triangles);
+        let (mut used, triangles) = used_vertices(positions.count, triangles);
         let mut piece = self.vertices(&positions, &used)?;
         piece.triangles = triangles;
         if piece.normals.is_empty() {
             // glTF: flat normals, and tangents are to be ignored.
             let corners = 3 * piece.triangles.len() as u64;
-            context.charge(at, corners, vertex_bytes(&piece) + 12)?;
+            context.charge(at, corners, vertex_bytes(&piece) + 16)?;
+            used = piece.triangles.iter().flatten().map(|&v| used[v as usize]).collect();
             piece = accumulate::unshare(piece);
             normals::set_flat(&mut piece);
         } else {
@@ -167,7 +174,7 @@ impl Reader<'_> {
             }
             self.mend_tangents(&mut piece);
         }
-        Ok(Some(piece))
+        Ok(Some((piece, used)))
     }
 
     fn attribute(

@@ -20,6 +20,8 @@ pub use anchor::Anchor;
 pub(crate) use anchor::{PosedPoint, pose_anchor};
 use eliminate::{Candidate, eliminate, maximum_radius};
 
+use crate::inside::mostly_backs;
+use crate::rtao::Site;
 use crate::sampling::{fixed_pattern, hash, orthonormal_basis};
 use crate::{Ray, Tracer, offset_origin};
 
@@ -62,6 +64,26 @@ pub struct GeneratedPoints {
     pub anchors: Vec<Anchor>,
     /// Points that were dropped because they lie inside geometry.
     pub dropped_inside: u32,
+}
+
+impl GeneratedPoints {
+    /// Where the points are in the world at a pose, in the order of the layout, as sites to trace: keys are the points' own for
+    /// ever. `None` where a posed triangle has no normal.
+    pub fn sites_world(&self, scene: &Scene, pose: &Pose) -> Vec<Option<Site>> {
+        let mut sites = Vec::with_capacity(self.anchors.len());
+        for set in self.layout.sets() {
+            let first = set.first as usize;
+            sites.par_extend(self.anchors[first..first + set.len()].par_iter().map(|anchor| {
+                let posed = anchor.pose(scene, pose, set.instance as usize)?;
+                Some(Site {
+                    position_world: posed.position,
+                    normal_world: posed.normal,
+                    key: u64::from(anchor.site(set.instance)),
+                })
+            }));
+        }
+        sites
+    }
 }
 
 /// Why no points could be laid.
@@ -323,19 +345,10 @@ impl LaidInstance {
             let origin_world = offset_origin(posed.position, posed.normal);
             let (tangent, bitangent) = orthonormal_basis(posed.normal);
             fixed_pattern(rays, point.anchor.site(instance as u32), directions);
-            let mut back_faces = 0u32;
-            for (shot, d) in directions.iter().enumerate() {
-                // Each prefix of a pattern covers the hemisphere evenly, so a share that is far from the limit
-                // after a few rays will not cross it.
-                let share = f64::from(back_faces) / shot.max(1) as f64;
-                let limit = f64::from(params.inside_fraction);
-                if SETTLED.iter().any(|&(rays, margin)| shot == rays && (share - limit).abs() >= margin) {
-                    return share > limit;
-                }
-                let direction_world = tangent * d.x + bitangent * d.y + posed.normal * d.z;
-                back_faces += u32::from(is_back(origin_world, direction_world));
-            }
-            back_faces as f32 > params.inside_fraction * rays as f32
+            let limit = f64::from(params.inside_fraction);
+            mostly_backs(directions, &SETTLED, limit, |d| {
+                is_back(origin_world, tangent * d.x + bitangent * d.y + posed.normal * d.z)
+            })
         };
         let inside: Vec<bool> = self.points.par_iter().map_init(Vec::new, is_inside).collect();
         let before = self.points.len();
