@@ -16,7 +16,7 @@ use crate::judge::Judge;
 use crate::picture::write_file;
 use crate::progress::Bar;
 
-/// Flicker at which its map is palest.
+/// Flicker of the error at which its map is palest.
 const FLICKER_RANGE: f32 = 0.1;
 
 /// What `--json` prints.
@@ -97,7 +97,12 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
         let mut test = Test::new(folder, pictures, args.worst);
         (test.flicker, test.error_flicker) = (flicker.rms(), error_flicker.rms());
         if let Some(maps) = &args.maps {
-            test.write_maps(maps, args, &judge, error_flicker.map())?;
+            // Folders may have one name.
+            let own = match args.tests.len() {
+                1 => maps.clone(),
+                _ => maps.join(format!("{}-{}", number + 1, last_name(folder))),
+            };
+            test.write_maps(&own, args, &judge, error_flicker.map())?;
         }
         tests.push(test);
     }
@@ -147,19 +152,14 @@ impl Test {
         }
     }
 
-    /// Writes what FLIP sees in the worst pictures, and where errors flicker.
+    /// Writes into the folder `own` what FLIP sees in the worst pictures, and where errors flicker.
     fn write_maps(
         &mut self,
-        maps: &Path,
+        own: &Path,
         args: &CompareArgs,
         judge: &Judge,
         flicker: Option<Vec<f32>>,
     ) -> Result<()> {
-        let number = args.tests.iter().position(|folder| *folder == self.folder).unwrap_or(0);
-        let own = match args.tests.len() {
-            1 => maps.to_owned(),
-            _ => maps.join(format!("{}-{}", number + 1, last_name(&self.folder))),
-        };
         let Some(first) = self.pictures.first() else { return Ok(()) };
         let like = Picture::read(&args.reference.join(&first.name))?;
         for name in &self.worst {
