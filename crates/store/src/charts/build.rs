@@ -15,6 +15,9 @@ const MOST_ROWS: f64 = (1u64 << 27) as f64;
 /// The mesh is fine if at least this part of its triangles is smaller than a texel.
 const FINE_PART: f64 = 0.9;
 
+/// Longest edge of a fine mesh, in texels.
+const MOST_TEXELS_AN_EDGE: f64 = 4.0;
+
 /// Tries to find a texel edge that keeps to [`MOST_TEXELS`].
 const MOST_TRIES: usize = 12;
 
@@ -139,13 +142,17 @@ fn first_texel(surface: &Surface, params: &ChartParams) -> f64 {
     texel
 }
 
-/// Whether nearly all triangles are smaller than a texel.
+/// Whether nearly all triangles are smaller than a texel, and none is much larger: what lies between vertices is lost.
 fn is_fine(surface: &Surface, texel: f64) -> bool {
     let solid = (0..surface.corners.len()).filter(|&t| !surface.is_degenerate(t));
     let (mut all, mut small) = (0u64, 0u64);
     for t in solid {
+        let edge = surface.longest_edge(t);
+        if edge > MOST_TEXELS_AN_EDGE * texel {
+            return false;
+        }
         all += 1;
-        small += u64::from(surface.longest_edge(t) <= texel);
+        small += u64::from(edge <= texel);
     }
     all > 0 && small as f64 >= FINE_PART * all as f64
 }

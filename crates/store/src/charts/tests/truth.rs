@@ -172,6 +172,12 @@ fn loose_leaves_smaller_than_a_texel_are_kept_per_vertex() {
     leaves.1.extend(back);
     let (both, _) = checked(&leaves, &params(0.1));
     assert!(both.is_per_vertex() && both.texel_count() > 2 * leaves.0.len() as u32 - 64);
+    // One wide plate among them, whose light lies between its vertices.
+    let mut plate = leaves.clone();
+    let first = plate.0.len() as u32;
+    plate.0.extend([Vec3::ZERO, Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 0.0, 1.0)]);
+    plate.1.push([0, 2, 1].map(|v| first + v));
+    assert!(!checked(&plate, &params(0.1)).0.is_per_vertex());
     // Larger than a texel.
     assert!(!ChartSet::new(&leaves.0, &leaves.1, &params(0.004)).unwrap().is_per_vertex());
     // A fine mesh in one piece needs fewer texels than it has vertices.
