@@ -13,8 +13,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
 
 pub(crate) use bake::BakeArgs;
-pub(crate) use eval::{EvalArgs, Options};
-pub(crate) use verbs::{CompareArgs, DiffArgs, ErrorMap, EvalVerb, JudgeArgs};
+pub(crate) use eval::{EvalArgs, Options, ScenesArgs};
+pub(crate) use verbs::{CompareArgs, DiffArgs, ErrorMap, EvalVerb, JudgeArgs, PictureFormat, ReferenceArgs};
 pub(crate) use view::{Preset, ViewArgs, ViewKind};
 pub(crate) use watch::{DemoArgs, InspectArgs, LightArgs, RecordArgs};
 

@@ -53,7 +53,10 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         return view::run(args);
     }
     let threads = match &cli.command {
-        Command::Eval(args) => args.threads,
+        Command::Eval(args) => match &args.verb {
+            Some(args::EvalVerb::Reference(args)) => args.threads,
+            _ => args.threads,
+        },
         Command::Render(args) => args.threads,
         Command::Record(args) => args.threads,
         Command::Quality(args) => args.threads,

@@ -151,13 +151,23 @@ impl Shown {
         &self.covered
     }
 
+    /// Linear light of each pixel.
+    pub(crate) fn radiance(&self) -> &[Vec3] {
+        &self.radiance
+    }
+
     /// Writes `STEM-beauty.png` and `STEM-visibility.png`.
     pub(crate) fn write(&self, folder: &Path, stem: &str) -> Result<Files> {
         let files =
             Files { beauty: format!("{stem}-beauty.png"), visibility: format!("{stem}-visibility.png") };
-        write_png(&folder.join(&files.beauty), self.width, self.height, &self.beauty)?;
-        write_png(&folder.join(&files.visibility), self.width, self.height, &self.visibility_picture)?;
+        self.write_as(&folder.join(&files.beauty), &folder.join(&files.visibility))?;
         Ok(files)
+    }
+
+    /// Writes the picture and its visibility as PNGs.
+    pub(crate) fn write_as(&self, beauty: &Path, visibility: &Path) -> Result<()> {
+        write_png(beauty, self.width, self.height, &self.beauty)?;
+        write_png(visibility, self.width, self.height, &self.visibility_picture)
     }
 }
 

@@ -316,3 +316,82 @@ fn help_of_the_verbs_shows_examples() {
     // After a flag of the evaluation, words are scenes.
     fail(Path::new("."), &["eval", "--frames", "2", "diff", "a.png", "b.png"], &["scene diff"]);
 }
+
+#[test]
+fn the_truth_alone_is_written_with_its_cameras() {
+    let folder = TempDir::new().unwrap();
+    let at = folder.path();
+    let arguments = [
+        "eval",
+        "reference",
+        "--builtin",
+        "atrium",
+        "--detail",
+        "0.05",
+        "--path",
+        "all",
+        "--frames",
+        "2",
+        "--size",
+        "64x48",
+        "--reference-rays",
+        "16",
+        "--formats",
+        "png,exr",
+        "--out",
+        "truth",
+    ];
+    let told = succeed(at, &arguments);
+    assert!(told.contains("4 pictures"), "{told}");
+    let index: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(at.join("truth/truth.json")).unwrap()).unwrap();
+    let cases = index["cases"].as_array().unwrap();
+    assert_eq!(cases.len(), 2);
+    for case in cases {
+        let frames = case["frames"].as_array().unwrap();
+        assert_eq!(frames.len(), 2);
+        assert_ne!(frames[0]["world_from_view"], frames[1]["world_from_view"], "the camera moves");
+        for frame in frames {
+            assert_eq!(frame["world_from_view"].as_array().unwrap().len(), 16);
+            assert!(frame["projection"]["perspective"]["yfov_radians"].as_f64().unwrap() > 0.1);
+            for kind in ["beauty", "visibility"] {
+                let stem = at.join("truth").join(frame[kind].as_str().unwrap());
+                assert_eq!(png_size(&stem.with_extension("png")), (64, 48));
+                let exr = image::open(stem.with_extension("exr")).unwrap().to_rgb32f();
+                assert!(exr.pixels().any(|p| p.0[0] > 0.0) && exr.dimensions() == (64, 48));
+            }
+        }
+    }
+    // The pictures are those that an evaluation compares with.
+    let told = succeed(
+        at,
+        &[
+            "eval",
+            "--builtin",
+            "atrium",
+            "--detail",
+            "0.05",
+            "--frames",
+            "2",
+            "--size",
+            "64x48",
+            "--reference-rays",
+            "16",
+            "--methods",
+            "none",
+            "--truth-cache",
+            "truth/truth",
+            "--out",
+            "o",
+        ],
+    );
+    assert!(told.contains("none"));
+    let results: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(at.join("o/results.json")).unwrap()).unwrap();
+    for (number, frame) in results["cases"][0]["truth"]["frames"].as_array().unwrap().iter().enumerate() {
+        let own = std::fs::read(at.join("o").join(frame["beauty"].as_str().unwrap())).unwrap();
+        assert!(
+            own == std::fs::read(at.join(format!("truth/atrium-path-walk/beauty/{number:04}.png"))).unwrap()
+        );
+    }
+}

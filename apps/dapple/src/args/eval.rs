@@ -26,18 +26,8 @@ results.csv, frames.csv, results.md, report.html and the pictures; docs/evaluati
 pub(crate) struct EvalArgs {
     #[command(subcommand)]
     pub(crate) verb: Option<EvalVerb>,
-    /// .gltf, .glb or .obj files [default: a small setting of the built-in atrium].
-    #[arg(value_name = "SCENE")]
-    pub(crate) scenes: Vec<PathBuf>,
-    /// Built-in scenes (`dapple scene` lists them).
-    #[arg(long, value_delimiter = ',', value_name = "NAME,…")]
-    pub(crate) builtin: Vec<String>,
-    /// Scenes and settings from a file, or a built-in suite by name (an unknown name lists them). Other flags override it.
-    #[arg(long, value_name = "NAME|FILE.toml", conflicts_with_all = ["scenes", "builtin"])]
-    pub(crate) suite: Option<String>,
-    /// Folder that a suite's scene files are in [default: that of the suite's file].
-    #[arg(long, value_name = "DIR", requires = "suite")]
-    pub(crate) scenes_folder: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) scenes: ScenesArgs,
     #[command(flatten)]
     pub(crate) options: Options,
     #[command(flatten)]
@@ -64,6 +54,23 @@ pub(crate) struct EvalArgs {
     /// Threads; 0 is one for each core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) threads: usize,
+}
+
+/// Which scenes.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ScenesArgs {
+    /// .gltf, .glb or .obj files [default: a small setting of the built-in atrium].
+    #[arg(value_name = "SCENE")]
+    pub(crate) scenes: Vec<PathBuf>,
+    /// Built-in scenes (`dapple scene` lists them).
+    #[arg(long, value_delimiter = ',', value_name = "NAME,…")]
+    pub(crate) builtin: Vec<String>,
+    /// Scenes and settings from a file, or a built-in suite by name (an unknown name lists them). Other flags override it.
+    #[arg(long, value_name = "NAME|FILE.toml", conflicts_with_all = ["scenes", "builtin"])]
+    pub(crate) suite: Option<String>,
+    /// Folder that a suite's scene files are in [default: that of the suite's file].
+    #[arg(long, value_name = "DIR", requires = "suite")]
+    pub(crate) scenes_folder: Option<PathBuf>,
 }
 
 /// What can be chosen for each scene. A suite's file has the same names.

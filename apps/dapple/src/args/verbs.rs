@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand, ValueEnum};
 use dapple_metrics::PIXELS_PER_DEGREE;
 
+use super::{Options, ScenesArgs};
+
 /// What `eval` does with pictures instead of a scene.
 #[derive(Debug, Clone, Subcommand)]
 pub(crate) enum EvalVerb {
@@ -14,9 +16,20 @@ pub(crate) enum EvalVerb {
     /// Compare folders of pictures of equal names with a folder of references.
     #[command(after_help = COMPARE_EXAMPLES)]
     Compare(CompareArgs),
+    /// Trace the truth along camera paths and write its pictures, for other programs to be compared with.
+    #[command(after_help = REFERENCE_EXAMPLES)]
+    Reference(Box<ReferenceArgs>),
     /// Write the report of results again, without tracing anything.
     Report(ReportArgs),
 }
+
+const REFERENCE_EXAMPLES: &str = "\
+Examples:
+  dapple eval reference room.glb --radius auto --frames 30 --reference-rays 4096 --out out/truth
+  dapple eval reference --builtin lab --path all --size 1920x1080 --formats png,exr
+  dapple eval compare out/truth/room-orbit/beauty out/mine/
+
+DIR/CASE/beauty and DIR/CASE/visibility get a picture a frame, DIR/truth.json says of what.";
 
 const DIFF_EXAMPLES: &str = "\
 Examples:
@@ -97,6 +110,35 @@ pub(crate) struct CompareArgs {
     /// Print JSON.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// What a picture is written as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PictureFormat {
+    /// 8 bits, tone-mapped.
+    Png,
+    /// Linear light in single precision.
+    Exr,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ReferenceArgs {
+    #[command(flatten)]
+    pub(crate) scenes: ScenesArgs,
+    #[command(flatten)]
+    pub(crate) options: Options,
+    /// What pictures are written as.
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "FORMAT,…", default_values_t = [PictureFormat::Png])]
+    pub(crate) formats: Vec<PictureFormat>,
+    /// Folder for the pictures, and for traced truth.
+    #[arg(long, value_name = "DIR", default_value = "out/reference")]
+    pub(crate) out: PathBuf,
+    /// Folder for traced truth, which evaluations can share [default: DIR/truth].
+    #[arg(long, value_name = "DIR", env = "DAPPLE_TRUTH_CACHE")]
+    pub(crate) truth_cache: Option<PathBuf>,
+    /// Threads; 0 is one for each core.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) threads: usize,
 }
 
 #[derive(Debug, Clone, Args)]

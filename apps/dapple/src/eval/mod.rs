@@ -11,6 +11,7 @@ mod journal;
 mod pair;
 mod plan;
 pub(crate) mod quality;
+mod reference;
 mod report;
 mod results;
 mod run;
@@ -40,7 +41,7 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
     if let Some(verb) = &args.verb {
         return verbs::run(verb);
     }
-    let plan = Plan::new(args)?;
+    let plan = Plan::new(&args.scenes, &args.options)?;
     let results = run::evaluate(&plan, args)?;
     say!("{}", table::text(&results));
     write(&results, &args.out)?;

@@ -72,12 +72,17 @@ pub(super) fn evaluate(plan: &Plan, args: &EvalArgs) -> Result<Results> {
         run: RunInfo {
             dapple_version: env!("CARGO_PKG_VERSION").to_owned(),
             commit: commit(),
-            command: std::env::args().skip(1).fold("dapple".to_owned(), |line, a| line + " " + &quoted(&a)),
+            command: command_line(),
         },
         machine: Machine::here(),
         cases,
         advice,
     })
+}
+
+/// The command that runs, to be pasted.
+pub(super) fn command_line() -> String {
+    std::env::args().skip(1).fold("dapple".to_owned(), |line, a| line + " " + &quoted(&a))
 }
 
 /// An argument as a shell takes it.
@@ -285,7 +290,7 @@ impl Run<'_> {
 }
 
 /// The paths that are asked for: by name, from files, all that move, or the scene's first.
-fn paths(loaded: &Loaded, wanted: &[String]) -> Result<Vec<CameraPath>> {
+pub(super) fn paths(loaded: &Loaded, wanted: &[String]) -> Result<Vec<CameraPath>> {
     if wanted.is_empty() {
         return Ok(vec![source::find_path(&loaded.scene, None)?]);
     }
@@ -315,7 +320,7 @@ fn unique(cases: &[Case], name: String) -> String {
 }
 
 /// A name that every file system takes.
-fn slug(name: &str) -> String {
+pub(super) fn slug(name: &str) -> String {
     let mut slug = String::new();
     for c in name.chars() {
         match c {

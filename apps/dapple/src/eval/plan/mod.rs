@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
-use crate::args::{EvalArgs, Options, SceneChoice};
+use crate::args::{Options, SceneChoice, ScenesArgs};
 
 pub(super) use settings::{CLIENT_HZ, Settings};
 
@@ -32,10 +32,10 @@ pub(super) struct Entry {
 }
 
 impl Plan {
-    pub(super) fn new(args: &EvalArgs) -> Result<Plan> {
-        let plan = match &args.suite {
-            Some(suite) => suite::read(suite, args)?,
-            None => from_flags(args)?,
+    pub(super) fn new(scenes: &ScenesArgs, flags: &Options) -> Result<Plan> {
+        let plan = match &scenes.suite {
+            Some(suite) => suite::read(suite, scenes.scenes_folder.as_deref(), flags)?,
+            None => from_flags(scenes, flags)?,
         };
         for entry in &plan.entries {
             if let Some(path) = &entry.scene.scene {
@@ -48,8 +48,7 @@ impl Plan {
     }
 }
 
-fn from_flags(args: &EvalArgs) -> Result<Plan> {
-    let flags = &args.options;
+fn from_flags(args: &ScenesArgs, flags: &Options) -> Result<Plan> {
     if let (Some(file), Some(_)) = (args.scenes.first(), flags.detail)
         && args.builtin.is_empty()
     {

@@ -1,12 +1,12 @@
 //! Suites: TOML files with scenes and settings (docs/suites.md), some of them built in.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 
 use super::{Plan, Which, below, entry};
-use crate::args::{EvalArgs, Options};
+use crate::args::Options;
 use crate::source::read_limited;
 
 /// The largest file that is read.
@@ -39,13 +39,13 @@ struct Suite {
 }
 
 /// Reads a built-in suite or a file.
-pub(super) fn read(wanted: &str, args: &EvalArgs) -> Result<Plan> {
+pub(super) fn read(wanted: &str, scenes_folder: Option<&Path>, flags: &Options) -> Result<Plan> {
     if let Some((name, text, _)) = BUILTIN.iter().find(|(name, _, _)| *name == wanted) {
-        let folder = args.scenes_folder.clone().unwrap_or_default();
-        if args.scenes_folder.is_none() && text.contains("\nscene = ") {
+        if scenes_folder.is_none() && text.contains("\nscene = ") {
             bail!("the suite {name} needs --scenes-folder DIR: its scenes are not part of the program");
         }
-        return plan(text, &folder, &args.options).with_context(|| format!("the suite {name}"));
+        return plan(text, scenes_folder.unwrap_or(Path::new("")), flags)
+            .with_context(|| format!("the suite {name}"));
     }
     let path = Path::new(wanted);
     if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
@@ -55,9 +55,8 @@ pub(super) fn read(wanted: &str, args: &EvalArgs) -> Result<Plan> {
     let bytes =
         read_limited(path, MAX_BYTES).with_context(|| format!("cannot read the suite {}", path.display()))?;
     let text = String::from_utf8(bytes).with_context(|| format!("{} is not UTF-8", path.display()))?;
-    let beside = path.parent().map(Path::to_owned).unwrap_or_default();
-    let folder: PathBuf = args.scenes_folder.clone().unwrap_or(beside);
-    plan(&text, &folder, &args.options).with_context(|| format!("the suite {}", path.display()))
+    let folder = scenes_folder.or(path.parent()).unwrap_or(Path::new(""));
+    plan(&text, folder, flags).with_context(|| format!("the suite {}", path.display()))
 }
 
 fn plan(text: &str, folder: &Path, flags: &Options) -> Result<Plan> {
