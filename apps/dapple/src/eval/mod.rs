@@ -5,7 +5,7 @@ pub(crate) mod quality;
 mod report;
 #[allow(dead_code, reason = "shown by the evaluation of schema 2")]
 #[path = "report/mod.rs"]
-pub(crate) mod report_2;
+mod report_2;
 mod results;
 #[allow(dead_code, reason = "written by the evaluation of schema 2")]
 mod results_2;

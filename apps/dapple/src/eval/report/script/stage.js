@@ -160,12 +160,6 @@ function zoomBy(factor, atX = 0.5, atY = 0.5) {
   rememberPlace();
 }
 
-/** Zooms so that one pixel of a picture is `pixels` of the page. */
-function zoomTo(pixels) {
-  const pane = ui.panes[0]?.element;
-  if (pane) zoomBy((pixels * cases[show.case].width) / pane.clientWidth / show.zoom);
-}
-
 function fit() {
   Object.assign(show, { zoom: 1, x: 0.5, y: 0.5 });
   placeViews();

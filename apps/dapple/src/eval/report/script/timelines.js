@@ -110,6 +110,7 @@ function linePlot(place, caseIndex, lines, { unit, digits, xUnit, xDigits, tall,
     },
   };
   const plot = plotIn(place, options, values, (width) => (tall ? 300 : width < LABEL_WIDTH ? 190 : 220));
+  plot.showsMoment = Boolean(mark);
   plot.over.addEventListener("mouseleave", () => hint.hide());
   if (onPick) {
     plot.over.classList.add("pick");
@@ -139,6 +140,11 @@ function rangeOfLines(low, high, zero) {
   const bottom = zero ? 0 : low;
   const room = Math.max(high - bottom, Math.abs(high) * 0.02, 1e-6) * 0.08;
   return [zero ? 0 : bottom - room, high + room];
+}
+
+/** Redraws what shows the moment of the viewer. */
+function redrawMoments() {
+  for (const plot of plots) if (plot.showsMoment && plot.root.isConnected) plot.redraw(false);
 }
 
 /** Where the picture that the viewer shows lies. */
@@ -225,7 +231,7 @@ function drawMetric(add, caseIndex, shown, column) {
     add(title, shown.length ? "None of the rows shown has such values." : "No row is chosen.");
   } else {
     add(title, (inside) => {
-      const plot = linePlot(inside, caseIndex, lines, {
+      linePlot(inside, caseIndex, lines, {
         unit: column.unit,
         digits: column.digits,
         xUnit: "s",
@@ -240,7 +246,6 @@ function drawMetric(add, caseIndex, shown, column) {
             }
           : null,
       });
-      timeState.plot = plot;
     });
   }
 }

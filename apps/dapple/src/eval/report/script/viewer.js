@@ -65,8 +65,6 @@ function change(changes) {
   }
   const inside = (index) => Math.min(Math.max(TRUTH, index), rows.length - 1);
   [show.a, show.b] = [inside(show.a), inside(show.b)];
-  if ("view" in changes || "case" in changes || "frame" in changes || "a" in changes || "b" in changes)
-    show.flip = changes.flip ?? show.flip;
   renderViewer(before);
 }
 
@@ -87,7 +85,7 @@ function renderViewer(before = null) {
   showFacts();
   sizeStage();
   placeViews();
-  if (differs("case", "frame") && timeState.plot) redrawPlots();
+  if (differs("case", "frame")) redrawMoments();
   rememberPlace();
 }
 
