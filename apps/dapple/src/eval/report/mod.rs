@@ -25,13 +25,15 @@ const PAGE: &str = include_str!("page.html");
 const STYLE: [&str; 3] =
     [include_str!("vendor/uPlot.min.css"), include_str!("page.css"), include_str!("viewer.css")];
 /// In the order in which they build on each other; they share one scope.
-const SCRIPTS: [&str; 9] = [
+const SCRIPTS: [&str; 11] = [
     include_str!("script/data.js"),
     include_str!("script/theme.js"),
     include_str!("script/plot.js"),
+    include_str!("script/marks.js"),
     include_str!("script/quality.js"),
     include_str!("script/timelines.js"),
     include_str!("script/table.js"),
+    include_str!("script/stage.js"),
     include_str!("script/viewer.js"),
     include_str!("script/gestures.js"),
     include_str!("script/main.js"),

@@ -97,7 +97,10 @@ function figureText(column, [value, ci95]) {
 
 /** What tells a row from others of its method in words, but for some parameters. */
 function settingOf(row, ...without) {
-  return row.setting.filter(([key]) => !without.includes(key)).map(([, words]) => words).join(", ");
+  return row.setting
+    .filter(([key]) => !without.includes(key))
+    .map(([, words]) => words)
+    .join(", ");
 }
 
 /** A row's name in one line. A method's own name may say its rays, as `rtao-16` does. */

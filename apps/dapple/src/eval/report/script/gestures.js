@@ -39,7 +39,10 @@ function startGestures() {
       return;
     }
     const box = stage.getBoundingClientRect();
-    const onDivider = show.mode === "slider" && show.flip === null && Math.abs(event.clientX - box.left - show.split * box.width) < GRIP;
+    const onDivider =
+      show.mode === "slider" &&
+      show.flip === null &&
+      Math.abs(event.clientX - box.left - show.split * box.width) < GRIP;
     const whole = show.zoom <= 1.001;
     if (show.mode === "slider" && show.flip === null && (onDivider || whole)) {
       drag = { kind: "split" };
@@ -92,23 +95,28 @@ function startGestures() {
   });
 
   let hintTimer = 0;
-  stage.addEventListener("wheel", (event) => {
-    const place = placeInPane(event);
-    if (!place) return;
-    const active = event.ctrlKey || event.metaKey || stage.contains(document.activeElement) || document.fullscreenElement;
-    if (!active) {
-      // The page scrolls on; only where someone seems to want something else a word is said.
-      ui.wheelHint.hidden = false;
-      clearTimeout(hintTimer);
-      hintTimer = setTimeout(() => (ui.wheelHint.hidden = true), 1200);
-      return;
-    }
-    const pixels = event.deltaY * (event.deltaMode === 1 ? 16 : event.deltaMode === 2 ? 400 : 1);
-    if (pixels > 0 && show.zoom <= 1.001 && !event.ctrlKey) return;
-    event.preventDefault();
-    zoomBy(2 ** (-pixels / 240), place.x, place.y);
-    readOut(event);
-  }, { passive: false });
+  stage.addEventListener(
+    "wheel",
+    (event) => {
+      const place = placeInPane(event);
+      if (!place) return;
+      const active =
+        event.ctrlKey || event.metaKey || stage.contains(document.activeElement) || document.fullscreenElement;
+      if (!active) {
+        // The page scrolls on; only where someone seems to want something else a word is said.
+        ui.wheelHint.hidden = false;
+        clearTimeout(hintTimer);
+        hintTimer = setTimeout(() => (ui.wheelHint.hidden = true), 1200);
+        return;
+      }
+      const pixels = event.deltaY * (event.deltaMode === 1 ? 16 : event.deltaMode === 2 ? 400 : 1);
+      if (pixels > 0 && show.zoom <= 1.001 && !event.ctrlKey) return;
+      event.preventDefault();
+      zoomBy(2 ** (-pixels / 240), place.x, place.y);
+      readOut(event);
+    },
+    { passive: false },
+  );
 
   divider.addEventListener("keydown", (event) => {
     const step = { ArrowLeft: -0.02, ArrowRight: 0.02, PageDown: -0.1, PageUp: 0.1, Home: -1, End: 1 }[event.key];
@@ -121,7 +129,9 @@ function startGestures() {
 
   // Keys work while the viewer is what fills the window.
   let near = false;
-  new IntersectionObserver(([entry]) => (near = entry.isIntersecting), { rootMargin: "-35% 0px -35% 0px" }).observe(ui.viewer);
+  new IntersectionObserver(([entry]) => (near = entry.isIntersecting), { rootMargin: "-35% 0px -35% 0px" }).observe(
+    ui.viewer,
+  );
   document.addEventListener("keydown", (event) => {
     const typing = event.target.closest?.("input, select, textarea, [contenteditable]");
     const inside = ui.viewer.contains(event.target);
@@ -199,13 +209,17 @@ function pixelText(color, index) {
   if (view === "beauty") return { hex, words: color.join(" ") };
   if (view === "visibility") {
     const gray = color[0] === color[1] && color[1] === color[2];
-    return gray ? { hex, words: text(color[0] / 255, 3), value: color[0] / 255 } : { hex, words: "edge or no geometry" };
+    return gray
+      ? { hex, words: text(color[0] / 255, 3), value: color[0] / 255 }
+      : { hex, words: "edge or no geometry" };
   }
   if (view === "error") {
     const { at, distance } = onScale(data.scales.error, color);
     const value = (at * 2 - 1) * data.scales.error_range;
     const end = at < 0.001 || at > 0.999;
-    return distance > 6 ? { hex, words: "edge or no geometry" } : { hex, words: `${end ? "beyond " : ""}${value > 0 ? "+" : ""}${text(value, 3)}` };
+    return distance > 6
+      ? { hex, words: "edge or no geometry" }
+      : { hex, words: `${end ? "beyond " : ""}${value > 0 ? "+" : ""}${text(value, 3)}` };
   }
   const { at } = onScale(data.scales.flip, color);
   return { hex, words: text(at, 3) };
@@ -230,7 +244,9 @@ function readOut(event) {
   const x = show.x + (place.x - 0.5) / show.zoom;
   const y = show.y + (place.y - 0.5) / show.zoom;
   if (x < 0 || x >= 1 || y < 0 || y >= 1) return;
-  const parts = [make("span", { className: "where" }, `${Math.floor(x * found.width)}, ${Math.floor(y * found.height)}`)];
+  const parts = [
+    make("span", { className: "where" }, `${Math.floor(x * found.width)}, ${Math.floor(y * found.height)}`),
+  ];
   // In the grid what is pointed at and the truth are enough.
   const panes = show.mode === "grid" ? ui.panes.filter((one) => one === place.one || one.index === TRUTH) : ui.panes;
   const values = [];
@@ -279,7 +295,12 @@ function rememberPlace() {
 /** The sight that the page's address asks for; true if it asks for one. */
 function recallPlace() {
   if (!location.hash.startsWith("#see:")) return false;
-  const asked = new Map(location.hash.slice("#see:".length).split(",").map((part) => part.split("=")));
+  const asked = new Map(
+    location.hash
+      .slice("#see:".length)
+      .split(",")
+      .map((part) => part.split("=")),
+  );
   for (const key of REMEMBERED) {
     const value = asked.get(key);
     if (value === undefined) continue;

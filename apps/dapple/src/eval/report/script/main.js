@@ -36,7 +36,12 @@ function drawWorst() {
         const time = found.time_s[frame];
         const when = time === undefined ? `picture ${frame + 1}` : `${text(time, 2)} s`;
         const image = make("img", { alt: "", decoding: "async" });
-        const thumb = make("button", { type: "button", "aria-label": `${rowName(row)} at ${when}: ${column.title} ${words}` }, image, make("span", {}, make("b", {}, words), ` ${when}`));
+        const thumb = make(
+          "button",
+          { type: "button", "aria-label": `${rowName(row)} at ${when}: ${column.title} ${words}` },
+          image,
+          make("span", {}, make("b", {}, words), ` ${when}`),
+        );
         thumb.style.setProperty("--aspect", found.width / found.height);
         if (!hasPictures(caseIndex)) {
           image.remove();
@@ -50,37 +55,62 @@ function drawWorst() {
           if (url) image.src = url;
           else image.remove();
         });
-        thumb.addEventListener("click", () => showInViewer({ case: caseIndex, frame, view, mode: "slider", a: TRUTH, b: index, flip: null }));
+        thumb.addEventListener("click", () =>
+          showInViewer({ case: caseIndex, frame, view, mode: "slider", a: TRUTH, b: index, flip: null }),
+        );
         return thumb;
       });
-      return make("div", { className: "worst-group" }, make("h4", {}, words), make("div", { className: "thumbs" }, ...thumbs));
+      return make(
+        "div",
+        { className: "worst-group" },
+        make("h4", {}, words),
+        make("div", { className: "thumbs" }, ...thumbs),
+      );
     });
-    list.append(make("div", { className: "worst-row" }, make("h3", {}, swatch(row.method), row.method, " ", make("small", {}, settingOf(row))), ...groups));
+    list.append(
+      make(
+        "div",
+        { className: "worst-row" },
+        make("h3", {}, swatch(row.method), row.method, " ", make("small", {}, settingOf(row))),
+        ...groups,
+      ),
+    );
   }
 }
 
 function startWorst() {
   const anyFrames = cases.some((one) => one.rows.some((row) => Object.keys(row.frames).length));
   if (!anyFrames) {
-    document.getElementById("worst-list").append(make("p", { className: "empty" }, "There is no picture to choose from."));
+    document
+      .getElementById("worst-list")
+      .append(make("p", { className: "empty" }, "There is no picture to choose from."));
     return;
   }
   if (cases.length > 1) {
     const options = cases.map((one, i) => [String(i), one.name]);
-    document.getElementById("worst-controls").append(select("case", options, "0", (value) => {
-      worstState.one = Number(value);
-      drawWorst();
-    }));
+    document.getElementById("worst-controls").append(
+      select("case", options, "0", (value) => {
+        worstState.one = Number(value);
+        drawWorst();
+      }),
+    );
   }
   if (cases.some((one, index) => bestRows(index).length < one.rows.length)) {
-    const options = [[false, "Best setting of each method"], [true, "All settings"]];
-    document.getElementById("worst-controls").append(segments("Rows", options, worstState.all, (all) => {
-      worstState.all = all;
-      drawWorst();
-    }));
+    const options = [
+      [false, "Best setting of each method"],
+      [true, "All settings"],
+    ];
+    document.getElementById("worst-controls").append(
+      segments("Rows", options, worstState.all, (all) => {
+        worstState.all = all;
+        drawWorst();
+      }),
+    );
   }
   if (cases.every((_, index) => frameCount(index) < 2)) {
-    document.getElementById("worst-controls").append(make("p", { className: "note" }, "There is one picture only, which is the best one too."));
+    document
+      .getElementById("worst-controls")
+      .append(make("p", { className: "note" }, "There is one picture only, which is the best one too."));
   }
   drawWorst();
 }
@@ -105,14 +135,18 @@ function startContents() {
     }
   };
   let waiting = false;
-  addEventListener("scroll", () => {
-    if (waiting) return;
-    waiting = true;
-    requestAnimationFrame(() => {
-      waiting = false;
-      mark();
-    });
-  }, { passive: true });
+  addEventListener(
+    "scroll",
+    () => {
+      if (waiting) return;
+      waiting = true;
+      requestAnimationFrame(() => {
+        waiting = false;
+        mark();
+      });
+    },
+    { passive: true },
+  );
   mark();
 }
 

@@ -47,7 +47,9 @@ function startTable() {
   const filter = () => {
     for (const row of rows) {
       const { method } = cases[row.dataset.case].rows[row.dataset.row];
-      row.hidden = (wanted.one !== "all" && wanted.one !== row.dataset.case) || (wanted.method !== "all" && wanted.method !== method);
+      row.hidden =
+        (wanted.one !== "all" && wanted.one !== row.dataset.case) ||
+        (wanted.method !== "all" && wanted.method !== method);
     }
   };
   const choose = (name) => (value) => {
@@ -56,7 +58,9 @@ function startTable() {
   };
   const controls = document.getElementById("table-controls");
   if (cases.length > 1) {
-    controls.append(select("case", [["all", "all cases"], ...cases.map((one, i) => [String(i), one.name])], "all", choose("one")));
+    controls.append(
+      select("case", [["all", "all cases"], ...cases.map((one, i) => [String(i), one.name])], "all", choose("one")),
+    );
   }
   const methods = [...looks.keys()];
   if (methods.length > 1) {
@@ -64,31 +68,47 @@ function startTable() {
   }
   // What is copied has a column of its own for each interval.
   const cells = () => {
-    const intervals = heads.map((head, i) => head.classList.contains("n") && rows.some((row) => row.cells[i].querySelector("i")));
+    const intervals = heads.map(
+      (head, i) => head.classList.contains("n") && rows.some((row) => row.cells[i].querySelector("i")),
+    );
     const head = heads.flatMap((cell, i) => {
       const name = cell.textContent.trim().replace(/\s+/g, " ");
       return intervals[i] ? [name, `± ${name}`] : [name];
     });
-    const lines = [...body.rows].filter((row) => !row.hidden).map((row) => heads.flatMap((_, i) => {
-      const cell = row.cells[i];
-      const value = (cell.querySelector("span") ?? cell).textContent.trim();
-      const interval = cell.querySelector("i")?.textContent.replace("± ", "") ?? "";
-      return intervals[i] ? [value, interval] : [value];
-    }));
+    const lines = [...body.rows]
+      .filter((row) => !row.hidden)
+      .map((row) =>
+        heads.flatMap((_, i) => {
+          const cell = row.cells[i];
+          const value = (cell.querySelector("span") ?? cell).textContent.trim();
+          const interval = cell.querySelector("i")?.textContent.replace("± ", "") ?? "";
+          return intervals[i] ? [value, interval] : [value];
+        }),
+      );
     return [head, ...lines];
   };
   const plain = (value) => (value === "–" ? "" : value.replace(/^−/, "-").replace(/(\d),(?=\d{3})/g, "$1"));
-  const csv = () => cells().map((line) => line.map((value) => {
-    const bare = plain(value);
-    return /[",\n]/.test(bare) ? `"${bare.replaceAll('"', '""')}"` : bare;
-  }).join(",")).join("\n");
+  const csv = () =>
+    cells()
+      .map((line) =>
+        line
+          .map((value) => {
+            const bare = plain(value);
+            return /[",\n]/.test(bare) ? `"${bare.replaceAll('"', '""')}"` : bare;
+          })
+          .join(","),
+      )
+      .join("\n");
   const markdown = () => {
     const [head, ...lines] = cells().map((line) => line.map((value) => value.replaceAll("|", "\\|")));
     const line = (values) => `| ${values.join(" | ")} |`;
     return [line(head), line(head.map(() => "---")), ...lines.map(line)].join("\n");
   };
   const tools = make("div", { className: "tools" });
-  for (const [name, write] of [["Copy CSV", csv], ["Copy Markdown", markdown]]) {
+  for (const [name, write] of [
+    ["Copy CSV", csv],
+    ["Copy Markdown", markdown],
+  ]) {
     tools.append(copyButton(name, () => `${write()}\n`));
   }
   const save = make("button", { type: "button" }, "Save CSV");

@@ -32,7 +32,10 @@ const looks = (() => {
   const marks = new Set(methods.map((method) => knownOf(method)?.[2]).filter(Boolean));
   const taken = new Set();
   const markFor = (wanted) => {
-    const mark = wanted && !taken.has(wanted) ? wanted : (MARKS.find((one) => !marks.has(one)) ?? MARKS[found.size % MARKS.length]);
+    const mark =
+      wanted && !taken.has(wanted)
+        ? wanted
+        : (MARKS.find((one) => !marks.has(one)) ?? MARKS[found.size % MARKS.length]);
     marks.add(mark);
     taken.add(mark);
     return mark;
@@ -103,31 +106,66 @@ function markPath(mark, x, y, radius) {
   const third = Math.PI / 3;
   switch (mark) {
     case "square":
-      polygon([[-0.9, -0.9], [0.9, -0.9], [0.9, 0.9], [-0.9, 0.9]]);
+      polygon([
+        [-0.9, -0.9],
+        [0.9, -0.9],
+        [0.9, 0.9],
+        [-0.9, 0.9],
+      ]);
       break;
     case "triangle":
-      polygon([[0, -1.15], [1.1, 0.85], [-1.1, 0.85]]);
+      polygon([
+        [0, -1.15],
+        [1.1, 0.85],
+        [-1.1, 0.85],
+      ]);
       break;
     case "down":
-      polygon([[0, 1.15], [1.1, -0.85], [-1.1, -0.85]]);
+      polygon([
+        [0, 1.15],
+        [1.1, -0.85],
+        [-1.1, -0.85],
+      ]);
       break;
     case "diamond":
-      polygon([[0, -1.25], [1.25, 0], [0, 1.25], [-1.25, 0]]);
+      polygon([
+        [0, -1.25],
+        [1.25, 0],
+        [0, 1.25],
+        [-1.25, 0],
+      ]);
       break;
     case "cross":
       polygon([
-        [-1, -0.55], [-0.55, -1], [0, -0.45], [0.55, -1], [1, -0.55], [0.45, 0],
-        [1, 0.55], [0.55, 1], [0, 0.45], [-0.55, 1], [-1, 0.55], [-0.45, 0],
+        [-1, -0.55],
+        [-0.55, -1],
+        [0, -0.45],
+        [0.55, -1],
+        [1, -0.55],
+        [0.45, 0],
+        [1, 0.55],
+        [0.55, 1],
+        [0, 0.45],
+        [-0.55, 1],
+        [-1, 0.55],
+        [-0.45, 0],
       ]);
       break;
     case "bar":
-      polygon([[-1.2, -0.5], [1.2, -0.5], [1.2, 0.5], [-1.2, 0.5]]);
+      polygon([
+        [-1.2, -0.5],
+        [1.2, -0.5],
+        [1.2, 0.5],
+        [-1.2, 0.5],
+      ]);
       break;
     case "star":
-      polygon([...Array(6)].flatMap((_, i) => [
-        [1.3 * Math.sin(i * third), -1.3 * Math.cos(i * third)],
-        [0.6 * Math.sin((i + 0.5) * third), -0.6 * Math.cos((i + 0.5) * third)],
-      ]));
+      polygon(
+        [...Array(6)].flatMap((_, i) => [
+          [1.3 * Math.sin(i * third), -1.3 * Math.cos(i * third)],
+          [0.6 * Math.sin((i + 0.5) * third), -0.6 * Math.cos((i + 0.5) * third)],
+        ]),
+      );
       break;
     default:
       path.arc(x, y, radius, 0, 2 * Math.PI);

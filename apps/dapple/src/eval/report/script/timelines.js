@@ -17,7 +17,9 @@ function rowsShown(caseIndex) {
 /** Dashes of a row: those shown of one colour differ. */
 function dashOf(caseIndex, index) {
   const { rows } = cases[caseIndex];
-  const before = [...rowsShown(caseIndex)].filter((other) => other < index && colorOf(rows[other].method) === colorOf(rows[index].method));
+  const before = [...rowsShown(caseIndex)].filter(
+    (other) => other < index && colorOf(rows[other].method) === colorOf(rows[index].method),
+  );
   return DASHES[before.length % DASHES.length];
 }
 
@@ -61,7 +63,10 @@ function linesName(caseIndex, rows) {
 /** A plot of lines that each have times of their own. */
 function linePlot(place, caseIndex, lines, { unit, digits, xUnit, xDigits, tall, rangeX, zero, onPick, sync, mark }) {
   const tables = lines.map((line) => [line.times, line.values]);
-  const values = uPlot.join(tables, tables.map((table) => table.map(() => 1)));
+  const values = uPlot.join(
+    tables,
+    tables.map((table) => table.map(() => 1)),
+  );
   const few = values[0].length <= 80;
   const options = {
     padding: [10, 26, 0, 0],
@@ -79,7 +84,11 @@ function linePlot(place, caseIndex, lines, { unit, digits, xUnit, xDigits, tall,
       y: { range: (_, low, high) => rangeOfLines(low, high, zero) },
     },
     axes: [
-      axis({ size: 30, space: 60, values: (_, ticks) => ticks.map((tick) => (tick === null ? "" : `${short(tick)} ${xUnit}`)) }),
+      axis({
+        size: 30,
+        space: 60,
+        values: (_, ticks) => ticks.map((tick) => (tick === null ? "" : `${short(tick)} ${xUnit}`)),
+      }),
       axis({ size: 52, space: 34, values: (_, ticks) => ticks.map(short) }),
     ],
     series: [
@@ -101,6 +110,7 @@ function linePlot(place, caseIndex, lines, { unit, digits, xUnit, xDigits, tall,
     },
   };
   const plot = plotIn(place, options, values, (width) => (tall ? 300 : width < LABEL_WIDTH ? 190 : 220));
+  plot.showsMoment = Boolean(mark);
   plot.over.addEventListener("mouseleave", () => hint.hide());
   if (onPick) {
     plot.over.classList.add("pick");
@@ -132,6 +142,11 @@ function rangeOfLines(low, high, zero) {
   return [zero ? 0 : bottom - room, high + room];
 }
 
+/** Redraws what shows the moment of the viewer. */
+function redrawMoments() {
+  for (const plot of plots) if (plot.showsMoment && plot.root.isConnected) plot.redraw(false);
+}
+
 /** Where the picture that the viewer shows lies. */
 function drawMoment(plot, time) {
   if (time === null || time < plot.scales.x.min || time > plot.scales.x.max) return;
@@ -155,15 +170,25 @@ function showValues(plot, lines, caseIndex, { unit, digits, xUnit, xDigits, onPi
   const box = plot.over.getBoundingClientRect();
   const values = lines.map((line, i) => ({ line, value: plot.data[i + 1][idxs[i + 1]] }));
   const filled = values.filter(({ value }) => value !== null && value !== undefined).sort((a, b) => b.value - a.value);
-  const list = make("dl", {}, ...filled.flatMap(({ line, value }) => {
-    const { method } = cases[caseIndex].rows[line.rows[0]];
-    return [
-      make("dt", {}, swatch(method, dashOf(caseIndex, line.rows[0])), ` ${linesName(caseIndex, line.rows)}`),
-      make("dd", {}, `${text(value, digits)}${unit ? ` ${unit}` : ""}`),
-    ];
-  }));
+  const list = make(
+    "dl",
+    {},
+    ...filled.flatMap(({ line, value }) => {
+      const { method } = cases[caseIndex].rows[line.rows[0]];
+      return [
+        make("dt", {}, swatch(method, dashOf(caseIndex, line.rows[0])), ` ${linesName(caseIndex, line.rows)}`),
+        make("dd", {}, `${text(value, digits)}${unit ? ` ${unit}` : ""}`),
+      ];
+    }),
+  );
   const head = make("strong", {}, `${text(plot.data[0][idx], xDigits)} ${xUnit}`);
-  hint.show(box.left + left, box.top + top, head, list, ...(onPick ? [make("small", {}, "click to see the pictures")] : []));
+  hint.show(
+    box.left + left,
+    box.top + top,
+    head,
+    list,
+    ...(onPick ? [make("small", {}, "click to see the pictures")] : []),
+  );
 }
 
 function drawTimeSection() {
@@ -194,22 +219,33 @@ function drawMetric(add, caseIndex, shown, column) {
   const title = [`${column.title}${column.unit ? `, ${column.unit}` : ""}, of each picture`, betterHint(column)];
   const lines = shown
     .filter((index) => found.rows[index].frames[column.key])
-    .map((index) => ({ rows: [index], times: found.time_s, values: found.time_s.map((_, i) => found.rows[index].frames[column.key][i] ?? null) }));
+    .map((index) => ({
+      rows: [index],
+      times: found.time_s,
+      values: found.time_s.map((_, i) => found.rows[index].frames[column.key][i] ?? null),
+    }));
   if (found.time_s.length < 2) {
-    add(title, `There is ${found.time_s.length ? "one picture only" : "no picture"} along the path: no line in time. Ask for more with --frames.`);
+    const count = found.time_s.length ? "one picture only" : "no picture";
+    add(title, `There is ${count} along the path: no line in time. Ask for more with --frames.`);
   } else if (!lines.length) {
     add(title, shown.length ? "None of the rows shown has such values." : "No row is chosen.");
   } else {
     add(title, (inside) => {
-      const plot = linePlot(inside, caseIndex, lines, {
-        unit: column.unit, digits: column.digits, xUnit: "s", xDigits: 2, rangeX: wholePath(found), sync: "path",
+      linePlot(inside, caseIndex, lines, {
+        unit: column.unit,
+        digits: column.digits,
+        xUnit: "s",
+        xDigits: 2,
+        rangeX: wholePath(found),
+        sync: "path",
         mark: () => viewerTime(caseIndex),
-        onPick: hasPictures(caseIndex) ? (time) => {
-          const frame = found.time_s.indexOf(time);
-          if (frame >= 0) showInViewer({ case: caseIndex, frame });
-        } : null,
+        onPick: hasPictures(caseIndex)
+          ? (time) => {
+              const frame = found.time_s.indexOf(time);
+              if (frame >= 0) showInViewer({ case: caseIndex, frame });
+            }
+          : null,
       });
-      timeState.plot = plot;
     });
   }
 }
@@ -229,10 +265,18 @@ function drawBits(add, caseIndex, shown) {
   } else if (lines.every((line) => line.values.length < 2)) {
     add(title, "The path has one server step only: no line in time.");
   } else {
-    add(title, (inside) => linePlot(inside, caseIndex, lines, {
-      unit: byStep ? "bytes" : "kbit/s", digits: byStep ? 0 : 1, xUnit: "s", xDigits: 2, rangeX: wholePath(found), zero: true, sync: "path",
-      mark: () => viewerTime(caseIndex),
-    }));
+    add(title, (inside) =>
+      linePlot(inside, caseIndex, lines, {
+        unit: byStep ? "bytes" : "kbit/s",
+        digits: byStep ? 0 : 1,
+        xUnit: "s",
+        xDigits: 2,
+        rangeX: wholePath(found),
+        zero: true,
+        sync: "path",
+        mark: () => viewerTime(caseIndex),
+      }),
+    );
   }
 }
 
@@ -247,28 +291,42 @@ function drawSettling(add, caseIndex, shown) {
       return { rows: [index], times: after_s.map((s) => s * 1000), values: visibility_psnr_db };
     });
   if (!lines.length) add(title, "None of the rows shown was looked at after a move.", true);
-  else add(title, (inside) => linePlot(inside, caseIndex, lines, { unit: "dB", digits: 2, xUnit: "ms", xDigits: 0, tall: true }), true);
+  else
+    add(
+      title,
+      (inside) => linePlot(inside, caseIndex, lines, { unit: "dB", digits: 2, xUnit: "ms", xDigits: 0, tall: true }),
+      true,
+    );
 }
 
 function drawTimeLegend() {
   const caseIndex = timeState.one;
   const shown = rowsShown(caseIndex);
   const legend = document.getElementById("time-legend");
-  legend.replaceChildren(...cases[caseIndex].rows.map((row, index) => {
-    const button = make("button", { type: "button", "aria-pressed": String(shown.has(index)) }, swatch(row.method, dashOf(caseIndex, index)), rowName(row));
-    button.addEventListener("click", () => {
-      if (!shown.delete(index)) shown.add(index);
-      drawTimeLegend();
-      drawTimeSection();
-      // The button is a new one, since dashes may have changed.
-      legend.children[index].focus();
-    });
-    return button;
-  }));
+  legend.replaceChildren(
+    ...cases[caseIndex].rows.map((row, index) => {
+      const button = make(
+        "button",
+        { type: "button", "aria-pressed": String(shown.has(index)) },
+        swatch(row.method, dashOf(caseIndex, index)),
+        rowName(row),
+      );
+      button.addEventListener("click", () => {
+        if (!shown.delete(index)) shown.add(index);
+        drawTimeLegend();
+        drawTimeSection();
+        // The button is a new one, since dashes may have changed.
+        legend.children[index].focus();
+      });
+      return button;
+    }),
+  );
 }
 
 function startTimelines() {
-  const metrics = qualityColumns.filter((column) => cases.some((one) => one.rows.some((row) => row.frames[column.key])));
+  const metrics = qualityColumns.filter((column) =>
+    cases.some((one) => one.rows.some((row) => row.frames[column.key])),
+  );
   timeState.metric = metrics[0]?.key ?? null;
   const controls = document.getElementById("time-controls");
   const all = () => {
@@ -276,23 +334,45 @@ function startTimelines() {
     drawTimeSection();
   };
   if (cases.length > 1) {
-    controls.append(select("case", cases.map((one, i) => [String(i), one.name]), "0", (value) => {
-      timeState.one = Number(value);
-      all();
-    }));
+    controls.append(
+      select(
+        "case",
+        cases.map((one, i) => [String(i), one.name]),
+        "0",
+        (value) => {
+          timeState.one = Number(value);
+          all();
+        },
+      ),
+    );
   }
   if (metrics.length > 1) {
-    const options = metrics.map((column) => [column.key, column.unit ? `${column.title}, ${column.unit}` : column.title]);
-    controls.append(select("quality", options, timeState.metric, (value) => {
-      timeState.metric = value;
-      drawTimeSection();
-    }));
+    const options = metrics.map((column) => [
+      column.key,
+      column.unit ? `${column.title}, ${column.unit}` : column.title,
+    ]);
+    controls.append(
+      select("quality", options, timeState.metric, (value) => {
+        timeState.metric = value;
+        drawTimeSection();
+      }),
+    );
   }
   if (cases.some((one) => one.rows.some((row) => row.step_bytes.length))) {
-    controls.append(select("bits", [["second", "kbit/s, sliding second"], ["step", "bytes a step"]], timeState.bits, (value) => {
-      timeState.bits = value;
-      drawTimeSection();
-    }));
+    controls.append(
+      select(
+        "bits",
+        [
+          ["second", "kbit/s, sliding second"],
+          ["step", "bytes a step"],
+        ],
+        timeState.bits,
+        (value) => {
+          timeState.bits = value;
+          drawTimeSection();
+        },
+      ),
+    );
   }
   if (cases.length) all();
 }

@@ -42,11 +42,8 @@ async function open({ file, width, height, dark, touch, script }) {
   });
   try {
     await tab.goto(pathToFileURL(file).href);
-    await tab.waitForFunction(() => document.documentElement.classList.contains("scripts"), null, { timeout: 30_000 });
-    report.result = await tab.evaluate(
-      (script) => Object.getPrototypeOf(async () => {}).constructor(script)(),
-      script,
-    );
+    await tab.waitForFunction(() => document.documentElement.classList.contains("scripts"), null, { timeout: 15_000 });
+    report.result = await tab.evaluate((script) => Object.getPrototypeOf(async () => {}).constructor(script)(), script);
   } catch (error) {
     report.errors.push(`driver: ${error.message}`);
   } finally {
