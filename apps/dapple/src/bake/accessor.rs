@@ -185,8 +185,9 @@ impl Document {
         ))
     }
 
-    /// Appends an accessor with the elements of another one at `sources`; gives its index. What else the accessor says is kept.
-    pub(crate) fn push_picked(&mut self, index: usize, sources: &[u32]) -> Result<usize> {
+    /// Makes an accessor with the elements of another one at `sources`, in its place or at the end of the list; gives its index.
+    /// What else the accessor says is kept.
+    pub(crate) fn pick(&mut self, index: usize, sources: &[u32], in_place: bool) -> Result<usize> {
         let mut accessor = self.object(List::Accessors, index)?;
         let elements = self.elements(index)?;
         if let Some(&bad) = sources.iter().find(|&&s| s as usize >= elements.count) {
@@ -222,6 +223,10 @@ impl Document {
         accessor.set("count", &sources.len())?;
         accessor.remove("byteOffset");
         accessor.remove("sparse");
+        if in_place {
+            self.put(List::Accessors, index, &accessor)?;
+            return Ok(index);
+        }
         self.push(List::Accessors, &accessor)
     }
 

@@ -98,12 +98,21 @@ impl Document {
         self.push(list, &serde_json::from_value(value.clone())?)
     }
 
+    /// Puts the last object of a list in the place of another one.
+    pub(crate) fn swap_remove(&mut self, list: List, index: usize) {
+        self.lists[list as usize].swap_remove(index);
+    }
+
     /// Takes all of a list's objects away, so that others take their place.
     pub(crate) fn take(&mut self, list: List) -> Vec<Raw> {
         std::mem::take(&mut self.lists[list as usize])
     }
 
     /// The document itself. Its lists are not to be found there.
+    pub(crate) fn root(&self) -> &Object {
+        &self.root
+    }
+
     pub(crate) fn root_mut(&mut self) -> &mut Object {
         &mut self.root
     }

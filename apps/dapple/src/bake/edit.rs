@@ -31,13 +31,15 @@ pub(crate) struct Dressed {
     pub(crate) extensions: Option<String>,
 }
 
-/// Writes the copies of a mesh; gives the index of each. The first takes the place of the mesh if nothing else uses that.
+/// Writes the copies of a mesh; gives the index of each. The first takes the place of the mesh unless that is to be kept for
+/// others. `users` tells how often accessors are named: those that only this mesh names are replaced.
 pub(crate) fn write_mesh(
     document: &mut Document,
     plan: &MeshPlan,
     origins: &Origins,
     edits: &[CopyEdit],
     keep: bool,
+    users: Option<&[u32]>,
 ) -> Result<Vec<usize>> {
     let origin = &origins.meshes[plan.mesh];
     let mesh = document.object(List::Meshes, plan.mesh)?;
@@ -47,9 +49,16 @@ pub(crate) fn write_mesh(
     for (index, pool) in plan.pools.iter().enumerate() {
         let gets_any =
             edits.iter().any(|edit| edit.attributes.get(index).is_some_and(|list| !list.is_empty()));
-        let primitive = origin.primitives[pool.pieces[0].part] as usize;
-        let primitive = Object::parse(&primitives[primitive])?;
-        shared.push(if gets_any { Some(Shared::write(document, pool, &primitive)?) } else { None });
+        let of_part = |part: usize| Object::parse(&primitives[origin.primitives[part] as usize]);
+        let own: Vec<Object> = pool.parts().into_iter().map(of_part).collect::<Result<_>>()?;
+        let users = users.filter(|_| !keep);
+        // What all copies get anew need not be copied first.
+        let is_new = |name: &str| {
+            edits.iter().all(|edit| {
+                edit.attributes.get(index).is_some_and(|list| list.iter().any(|a| a.name == name))
+            })
+        };
+        shared.push(if gets_any { Some(Shared::write(document, pool, &own, users, &is_new)?) } else { None });
     }
     let mut indices = Vec::new();
     for (number, edit) in edits.iter().enumerate() {
@@ -145,34 +154,59 @@ struct Shared {
 }
 
 impl Shared {
-    fn write(document: &mut Document, pool: &Pool, primitive: &Object) -> Result<Shared> {
+    /// `own` are the primitives of the pool's parts.
+    fn write(
+        document: &mut Document,
+        pool: &Pool,
+        own: &[Object],
+        users: Option<&[u32]>,
+        is_new: &dyn Fn(&str) -> bool,
+    ) -> Result<Shared> {
         let mut shared = Shared { attributes: pool.attributes.clone(), targets: None, indices: Vec::new() };
         let Some(sources) = &pool.sources else { return Ok(shared) };
-        let mut written: BTreeMap<usize, usize> = BTreeMap::new();
-        let mut pick = |document: &mut Document, of: &Object| -> Result<Object> {
-            let mut picked = of.clone();
-            let keys: Vec<String> = of.keys().map(str::to_owned).collect();
-            for key in keys {
-                let old = of.whole(&key)?.with_context(|| format!("the attribute {key}"))?;
-                let new = match written.get(&old) {
-                    Some(new) => *new,
-                    None => {
-                        document.push_picked(old, sources).with_context(|| format!("the attribute {key}"))?
-                    }
-                };
-                written.insert(old, new);
-                picked.set(&key, &new)?;
+        let targets: Vec<Object> =
+            own[0].list("targets")?.iter().map(|target| Object::parse(target)).collect::<Result<_>>()?;
+        // How often each primitive of the pool names an accessor.
+        let mut named: BTreeMap<usize, u32> = BTreeMap::new();
+        for attributes in std::iter::once(&pool.attributes).chain(&targets) {
+            for key in attributes.keys() {
+                *named.entry(attributes.whole(key)?.unwrap_or(usize::MAX)).or_default() += 1;
             }
-            Ok(picked)
-        };
-        shared.attributes = pick(document, &pool.attributes)?;
-        if primitive.has("targets") {
-            let targets = primitive.list("targets")?;
-            let picked = targets.iter().map(|target| pick(document, &Object::parse(target)?));
-            shared.targets = Some(picked.collect::<Result<_>>()?);
         }
-        for piece in &pool.pieces {
-            shared.indices.push(push_indices(document, &piece.triangles, sources.len())?);
+        let is_ours = |accessor: usize, times: u32| {
+            users.and_then(|users| users.get(accessor)).is_some_and(|users| *users == times)
+        };
+        let mut written: BTreeMap<usize, usize> = BTreeMap::new();
+        let mut pick =
+            |document: &mut Document, of: &Object, skips: &dyn Fn(&str) -> bool| -> Result<Object> {
+                let mut picked = of.clone();
+                let keys: Vec<String> = of.keys().map(str::to_owned).collect();
+                for key in keys.into_iter().filter(|key| !skips(key)) {
+                    let old = of.whole(&key)?.with_context(|| format!("the attribute {key}"))?;
+                    let new = match written.get(&old) {
+                        Some(new) => *new,
+                        None => {
+                            let times = named.get(&old).copied().unwrap_or(0) * own.len() as u32;
+                            let picked = document.pick(old, sources, is_ours(old, times));
+                            picked.with_context(|| format!("the attribute {key}"))?
+                        }
+                    };
+                    written.insert(old, new);
+                    picked.set(&key, &new)?;
+                }
+                Ok(picked)
+            };
+        shared.attributes = pick(document, &pool.attributes, is_new)?;
+        if own[0].has("targets") {
+            shared.targets =
+                Some(targets.iter().map(|target| pick(document, target, &|_| false)).collect::<Result<_>>()?);
+        }
+        let parts = pool.parts();
+        for (number, piece) in pool.pieces.iter().enumerate() {
+            let is_first = number == 0 || pool.pieces[number - 1].part != piece.part;
+            let own = &own[parts.partition_point(|part| *part < piece.part)];
+            let place = own.whole("indices")?.filter(|&old| is_first && is_ours(old, 1));
+            shared.indices.push(write_indices(document, &piece.triangles, sources.len(), place)?);
         }
         Ok(shared)
     }
@@ -189,7 +223,13 @@ impl Shared {
     }
 }
 
-fn push_indices(document: &mut Document, triangles: &[[u32; 3]], vertices: usize) -> Result<usize> {
+/// Writes indices to that accessor, or a new one; gives it.
+fn write_indices(
+    document: &mut Document,
+    triangles: &[[u32; 3]],
+    vertices: usize,
+    place: Option<usize>,
+) -> Result<usize> {
     let corners = triangles.as_flattened();
     // The largest 16-bit index is the restart of strips.
     let is_short = vertices <= 65535;
@@ -202,7 +242,10 @@ fn push_indices(document: &mut Document, triangles: &[[u32; 3]], vertices: usize
     let accessor = json!({
         "bufferView": view, "componentType": component, "count": corners.len(), "type": "SCALAR",
     });
-    document.push_value(List::Accessors, &accessor)
+    let accessor = document.push_value(List::Accessors, &accessor)?;
+    let Some(place) = place else { return Ok(accessor) };
+    document.swap_remove(List::Accessors, place);
+    Ok(place)
 }
 
 fn drop_compression(primitive: &mut Object, mesh: usize, place: usize) -> Result<()> {

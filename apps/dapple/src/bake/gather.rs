@@ -8,7 +8,7 @@ use super::document::{BIN, Document, List};
 use super::json::Object;
 
 /// Extensions of buffer views that name a buffer of their own.
-const COMPRESSED_VIEWS: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
+pub(crate) const COMPRESSED_VIEWS: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 
 /// Moves all buffers and images that can be read into buffer 0. What cannot be read stays a reference, with a warning.
 pub(crate) fn gather(document: &mut Document, name: &str, files: &dyn Files) -> Result<()> {

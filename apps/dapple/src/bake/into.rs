@@ -13,6 +13,7 @@ use super::layout::{Layout, Settings, lay_out};
 use super::materials::{Wardrobe, count_worn};
 use super::plan::{MeshPlan, Pool, plan, split_instances};
 use super::surfaces::Surfaces;
+use super::sweep::{accessor_users, sweep, views_in_use};
 use super::texels::{Images, bake_sheet};
 use super::vertices::{self, AtVertex, Density, Welded, bake_vertices, place_counts, spread};
 use crate::args::BakeArgs;
@@ -107,11 +108,15 @@ pub(crate) fn bake(
             Density { per_m2: f64::from(args.points * density_factor), rays: args.rays.div_ceil(2) };
         report.vertices = bake_all_vertices(args, &document, &plans, origins, surfaces, density, &mut edits)?;
     }
+    let (users, before) = (accessor_users(&document)?, views_in_use(&document)?);
     for (plan, edits) in plans.iter().zip(&edits) {
         let keep = elsewhere.contains(&plan.mesh);
-        let indices = edit::write_mesh(&mut document, plan, origins, edits, keep)?;
+        let indices = edit::write_mesh(&mut document, plan, origins, edits, keep, users.as_deref())?;
         report.copies += indices.len() - 1;
         edit::place_copies(&mut document, plan, origins, scene, &indices)?;
+    }
+    if let Some(users) = users {
+        sweep(&mut document, &before, &users)?;
     }
     Ok((document, report))
 }

@@ -19,6 +19,7 @@ mod points;
 mod raster;
 mod stitch;
 mod surfaces;
+mod sweep;
 mod texels;
 mod unwrap;
 mod vertices;

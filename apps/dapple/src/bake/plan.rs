@@ -202,7 +202,13 @@ fn comparison_places(surfaces: &Surfaces<'_>, instance: u32) -> Vec<Place> {
         .map(|i| {
             let at = (f64::from(i) + 0.5) / count as f64 * sum;
             let triangle = cumulative.partition_point(|&c| c <= at).min(triangles - 1) as u32;
-            Place { instance, triangle, weights: place_in_triangle(u64::from(i), 0) }
+            Place {
+                instance,
+                triangle,
+                weights: place_in_triangle(u64::from(i), 0),
+                key: u64::from(i),
+                turn: 0,
+            }
         })
         .collect()
 }

@@ -5,7 +5,6 @@ use dapple_scene::{Pose, Scene};
 use dapple_trace::Tracer;
 use dapple_trace::inside::{Solids, is_inside};
 use dapple_trace::rtao::{BentVisibility, RtaoParams, Site, SmoothSite, trace_bent};
-use dapple_trace::sampling::hash;
 use rayon::prelude::*;
 
 /// A scene in one pose, and the rays through it.
@@ -29,6 +28,10 @@ pub(crate) struct Place {
     pub(crate) instance: u32,
     pub(crate) triangle: u32,
     pub(crate) weights: [f32; 2],
+    /// Chooses the directions of its rays: places that are averaged share a key …
+    pub(crate) key: u64,
+    /// … and divide its directions among them.
+    pub(crate) turn: u32,
 }
 
 /// What was measured at a place.
@@ -133,17 +136,13 @@ impl<'a> Surfaces<'a> {
         let [v, w] = place.weights;
         let face = (b - a).cross(c - a).try_normalize().unwrap_or(Vec3::ZERO);
         let normal_world = if self.mirrored[instance] { -face } else { face };
-        let bits = |x: f32| u64::from(x.to_bits());
-        let of_triangle = u64::from(place.instance) << 32 | u64::from(place.triangle);
-        let key = u64::from(hash(of_triangle, bits(v) << 32 | bits(w), 0)) << 32
-            | u64::from(hash(of_triangle, bits(v) << 32 | bits(w), 1));
-        Site { position_world: a + (b - a) * v + (c - a) * w, normal_world, key }
+        Site { position_world: a + (b - a) * v + (c - a) * w, normal_world, key: place.key }
     }
 
     /// Measures places with so many rays each, in parallel.
     pub(crate) fn measure(&self, places: &[Place], rays: u32) -> Vec<Measured> {
         let sites: Vec<SmoothSite> =
-            places.par_iter().with_min_len(256).map(|place| self.smooth_site(place)).collect();
+            places.par_iter().with_min_len(256).map(|place| self.smooth_site(place, rays)).collect();
         let params = RtaoParams { rays, ..self.params };
         let mut bent = vec![BentVisibility::default(); sites.len()];
         trace_bent(&self.tracer, &sites, &params, &mut bent);
@@ -163,7 +162,7 @@ impl<'a> Surfaces<'a> {
     }
 
     /// Where rays start at a place, and the normal that it is shaded with.
-    fn smooth_site(&self, place: &Place) -> SmoothSite {
+    fn smooth_site(&self, place: &Place, rays: u32) -> SmoothSite {
         let site = self.site(place);
         let instance = place.instance as usize;
         let posed = &self.pose.instances[instance];
@@ -176,7 +175,7 @@ impl<'a> Surfaces<'a> {
         // A normal far from the face's is a slip of its maker.
         let usable = shading.is_finite() && shading.dot(site.normal_world) > LEAST_SHADING_COSINE;
         let shading_normal_world = if usable { shading } else { site.normal_world };
-        SmoothSite { site, shading_normal_world }
+        SmoothSite { site, shading_normal_world, first_ray: place.turn.saturating_mul(rays) }
     }
 
     /// Measures places on several instances of one mesh, and gives the mean of what can be seen; `rays` are shared among them.
@@ -184,9 +183,10 @@ impl<'a> Surfaces<'a> {
         let rays = rays.div_ceil(members.len().max(1) as u32).max(LEAST_RAYS.min(rays));
         let mut sums: Vec<Sum> = vec![Sum::default(); places.len()];
         let mut moved = places.to_vec();
-        for &member in members {
-            for place in &mut moved {
-                place.instance = member;
+        for (turn, &member) in (0u32..).zip(members) {
+            for (moved, place) in moved.iter_mut().zip(places) {
+                moved.instance = member;
+                moved.turn = place.turn * members.len() as u32 + turn;
             }
             for (sum, measured) in sums.iter_mut().zip(self.measure(&moved, rays)) {
                 sum.add(&measured);

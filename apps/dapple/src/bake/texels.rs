@@ -93,10 +93,12 @@ fn measure_band(
         let (mut texels, mut alone): (Vec<u32>, Vec<Place>) = (Vec::new(), Vec::new());
         let mut shared: Vec<(u32, u32, Place)> = Vec::new();
         for (texel, list) in (0u32..).zip(&found).filter(|(_, found)| found.places.len() == count) {
-            for on in &list.places {
+            let key = u64::from(band.rows.start) * u64::from(sheet.width) + u64::from(texel);
+            for (turn, on) in (0u32..).zip(&list.places) {
                 let patch = &sheet.patches[on.patch as usize];
                 let members = &copies[patch.copy as usize].members;
-                let place = Place { instance: members[0], triangle: patch.triangle, weights: on.weights };
+                let (instance, triangle, weights) = (members[0], patch.triangle, on.weights);
+                let place = Place { instance, triangle, weights, key, turn };
                 if members.len() == 1 {
                     texels.push(texel);
                     alone.push(place);

@@ -129,7 +129,8 @@ fn fit<const N: usize>(
         fit.triangle(corners.map(|v| welded.of_vertex[v as usize]), points);
         for index in 0..count {
             let weights = place_in_triangle(u64::from(t as u32), index);
-            places.push(Place { instance, triangle: t as u32, weights });
+            let key = u64::from(instance) << 32 | t as u64;
+            places.push(Place { instance, triangle: t as u32, weights, key, turn: index });
             areas.push(area / f64::from(count));
         }
         if places.len() >= BATCH {

@@ -77,9 +77,8 @@ pub fn trace_visibility_with_progress(
     assert_eq!(sites.len(), visibility.len(), "one visibility for each site");
     trace_each(sites, visibility, progress, |site, directions| {
         let mut blocked = 0;
-        let normal = site.normal_world;
-        let rays =
-            trace_site(tracer, site, normal, params, directions, |_, mask| blocked += count_blocked(mask));
+        let smooth = SmoothSite { site: *site, shading_normal_world: site.normal_world, first_ray: 0 };
+        let rays = trace_site(tracer, &smooth, params, directions, |_, mask| blocked += count_blocked(mask));
         if rays == 0 { 1.0 } else { (rays - blocked) as f32 / rays as f32 }
     });
 }
@@ -91,6 +90,9 @@ pub struct SmoothSite {
     pub site: Site,
     /// Unit normal that the surface is shaded with. It should be less than 90° from the face's.
     pub shading_normal_world: Vec3,
+    /// Index of its first direction in the endless sequence of its key, default 0. Neighbours that are averaged do best to
+    /// share a key and divide its sequence among them.
+    pub first_ray: u32,
 }
 
 /// Visibility of a site, and where from light comes to it.
@@ -114,9 +116,8 @@ pub struct BentVisibility {
 pub fn trace_bent(tracer: &Tracer, sites: &[SmoothSite], params: &RtaoParams, bent: &mut [BentVisibility]) {
     assert_eq!(sites.len(), bent.len(), "one result for each site");
     trace_each(sites, bent, &|_| {}, |smooth, directions| {
-        let SmoothSite { site, shading_normal_world } = smooth;
         let (mut open, mut sum) = (0, Vec3::ZERO);
-        let rays = trace_site(tracer, site, *shading_normal_world, params, directions, |directions, mask| {
+        let rays = trace_site(tracer, smooth, params, directions, |directions, mask| {
             open += directions.len() as u32 - count_blocked(mask);
             for (i, direction) in directions.iter().enumerate() {
                 if mask[i / 64] >> (i % 64) & 1 == 0 {
@@ -149,16 +150,16 @@ fn trace_each<S: Sync, T: Send>(
     });
 }
 
-/// Traces the rays of a site about a normal in batches, each given to `batch` with what blocks it. Tells how many rays there
+/// Traces the rays of a site about its shading normal in batches, each given to `batch` with what blocks it. Tells how many rays there
 /// were: fewer where some lie behind the face, none for a site without a normal.
 fn trace_site(
     tracer: &Tracer,
-    site: &Site,
-    about: Vec3,
+    smooth: &SmoothSite,
     params: &RtaoParams,
     directions: &mut Vec<Vec3>,
     mut batch: impl FnMut(&[Vec3], &BlockedMask),
 ) -> u32 {
+    let SmoothSite { site, shading_normal_world: about, first_ray } = *smooth;
     let normal = site.normal_world;
     let is_unit = |v: Vec3| v.is_finite() && v != Vec3::ZERO;
     if !is_unit(normal) || !is_unit(about) {
@@ -171,7 +172,8 @@ fn trace_site(
     let mut traced = 0;
     for first in (0..rays).step_by(MAX_DIRECTIONS) {
         directions.clear();
-        extend_pattern(first..rays.min(first + MAX_DIRECTIONS as u32), site_hash, directions);
+        let end = rays.min(first + MAX_DIRECTIONS as u32);
+        extend_pattern(first_ray.saturating_add(first)..first_ray.saturating_add(end), site_hash, directions);
         for d in directions.iter_mut() {
             *d = tangent * d.x + bitangent * d.y + about * d.z;
         }

@@ -228,8 +228,10 @@ fn bent(mesh: Mesh, sites: &[Site], rays: u32, radius_m: f32) -> Vec<BentVisibil
     let tracer = Tracer::new(&scene, &pose);
     let params = RtaoParams { rays, radius_m, seed: 3 };
     let mut bent = vec![BentVisibility::default(); sites.len()];
-    let smooth: Vec<SmoothSite> =
-        sites.iter().map(|s| SmoothSite { site: *s, shading_normal_world: s.normal_world }).collect();
+    let smooth: Vec<SmoothSite> = sites
+        .iter()
+        .map(|s| SmoothSite { site: *s, shading_normal_world: s.normal_world, first_ray: 0 })
+        .collect();
     trace_bent(&tracer, &smooth, &params, &mut bent);
     let mut plain = vec![f32::NAN; sites.len()];
     trace_visibility(&tracer, sites, &params, &mut plain);
@@ -286,8 +288,9 @@ fn visibility_about_shading_normals() {
     let trace = |mesh: Mesh, at: Vec3, shading_normal_world: Vec3, rays: u32| {
         let (scene, pose) = scene_of(mesh);
         let tracer = Tracer::new(&scene, &pose);
-        let sites: Vec<SmoothSite> =
-            (0..8).map(|key| SmoothSite { site: site(at, Vec3::Y, key), shading_normal_world }).collect();
+        let sites: Vec<SmoothSite> = (0..8)
+            .map(|key| SmoothSite { site: site(at, Vec3::Y, key), shading_normal_world, first_ray: 0 })
+            .collect();
         let mut bent = vec![BentVisibility::default(); 8];
         let params = RtaoParams { rays, radius_m: UNLIMITED, seed: 3 };
         trace_bent(&tracer, &sites, &params, &mut bent);
@@ -325,4 +328,20 @@ fn visibility_about_shading_normals() {
         }
         expect(&trace(wall.clone(), Vec3::ZERO, shading.as_vec3(), 16384), open / all, 4096, "tilted wall");
     }
+}
+
+/// The parts of a sequence, averaged, are the whole.
+#[test]
+fn sites_that_share_a_sequence_are_as_good_as_one() {
+    let (scene, pose) = scene_of(disc(Vec3::Y, 1.0, 512));
+    let tracer = Tracer::new(&scene, &pose);
+    let trace = |first_ray: u32, rays: u32| {
+        let site = site(Vec3::ZERO, Vec3::Y, 5);
+        let mut bent = [BentVisibility::default()];
+        let smooth = SmoothSite { site, shading_normal_world: Vec3::Y, first_ray };
+        trace_bent(&tracer, &[smooth], &RtaoParams { rays, radius_m: UNLIMITED, seed: 3 }, &mut bent);
+        bent[0].visibility
+    };
+    let parts: f32 = (0..4).map(|part| trace(part * 64, 64)).sum();
+    assert_eq!(parts / 4.0, trace(0, 256));
 }
