@@ -4,6 +4,7 @@
 //! methods that look it up: [`job`]). Truth is kept in files ([`truth`]), finished jobs in a [`journal`], so that a stopped run continues.
 
 mod advice;
+mod columns;
 mod export;
 mod figures;
 mod job;

@@ -1,80 +1,31 @@
-//! Results as tables: of text, of Markdown, and as values separated by commas.
+//! Results as tables of text and of Markdown.
 
-use super::results::{Case, Figure, Params, Results, Row};
+use super::columns::{Column, Setting, filled, number, settings};
+use super::results::{Case, Figure, Results, Row};
 
-/// Columns: titles, and what they mean.
-pub(super) const COLUMNS: [(&str, &str); 14] = [
-    ("method", "where visibility comes from"),
-    ("setting", "points spawned per m² (half are kept) and server rate, or rays a pixel"),
-    ("vis. PSNR", "PSNR of visibility against the truth over all pixels that show geometry, dB"),
-    ("PSNR", "PSNR of the whole picture, dB"),
-    ("SSIM", "mean structural similarity of luma"),
-    ("FLIP", "mean FLIP error, 0 is equal"),
-    ("LPIPS", "learned perceptual distance (squeeze), 0 is equal"),
-    ("flicker", "change of still places from one picture to the next at 60 Hz, root mean square, in 1/255"),
-    ("kbit/s", "bits of all updates over the path, snapshot not counted"),
-    ("join", "bytes of the snapshot that a new client receives"),
-    ("points", "points in the store"),
-    ("Mrays", "rays traced in the whole run, millions, the test for points inside geometry not counted"),
-    ("server ms", "mean wall time of a server step: pose, trees, rays, encoding"),
-    ("client ms", "mean wall time of reconstruction on the CPU and of applying an update"),
-];
-
-/// A row's cells; a dash where a column does not apply.
-pub(super) fn cells(row: &Row) -> [String; COLUMNS.len()] {
-    let dash = || "–".to_owned();
-    let number = |value: Option<f64>, digits: usize| value.map_or_else(dash, |v| format!("{v:.digits$}"));
-    let equal = |figure: &Figure| match figure.value {
-        None => "equal".to_owned(),
-        Some(_) => text_of(figure, 2),
-    };
-    let optional =
-        |figure: &Option<Figure>, digits| figure.as_ref().map_or_else(dash, |f| text_of(f, digits));
-    let visibility = if row.compared_pixels > 0 { equal(&row.visibility_psnr_db) } else { dash() };
-    [
-        row.method.clone(),
-        setting(&row.params),
-        visibility,
-        equal(&row.psnr_db),
-        text_of(&row.ssim, 4),
-        text_of(&row.flip, 4),
-        optional(&row.lpips, 4),
-        optional(&row.flicker, 2),
-        optional(&row.kbit_per_s, 1),
-        row.snapshot_bytes.map_or_else(dash, bytes),
-        row.points.map_or_else(dash, |p| p.to_string()),
-        format!("{:.1}", row.rays as f64 / 1e6),
-        number(row.times.server_ms, 2),
-        format!("{:.1}", row.times.client_ms),
-    ]
+/// A row's cells: method, setting, and the columns given; a dash where one does not apply.
+fn cells(row: &Row, setting: &Setting, columns: &[&Column]) -> Vec<String> {
+    let figures = columns.iter().map(|column| match (column.get)(row) {
+        None => "–".to_owned(),
+        // Only PSNR has no finite value, of equal pictures.
+        Some(Figure { value: None, .. }) => "equal".to_owned(),
+        Some(Figure { value: Some(value), ci95: None }) => number(value, column.digits),
+        Some(Figure { value: Some(value), ci95: Some(ci95) }) => {
+            format!("{} ± {}", number(value, column.digits), number(ci95, column.digits))
+        }
+    });
+    [row.method.clone(), setting.to_string()].into_iter().chain(figures).collect()
 }
 
-/// A figure with its interval.
-pub(super) fn text_of(figure: &Figure, digits: usize) -> String {
-    match (figure.value, figure.ci95) {
-        (None, _) => "–".to_owned(),
-        (Some(value), None) => format!("{value:.digits$}"),
-        (Some(value), Some(ci95)) => format!("{value:.digits$} ± {ci95:.digits$}"),
-    }
-}
-
-fn bytes(count: u64) -> String {
-    if count < 1000 { format!("{count} B") } else { format!("{:.0} kB", count as f64 / 1e3) }
-}
-
-/// What distinguishes rows of one method.
-pub(super) fn setting(params: &Params) -> String {
-    match (params.points_per_m2, params.hz, params.rays_per_pixel) {
-        (Some(n), Some(hz), _) => format!("N {n}, {hz} Hz"),
-        (_, _, Some(rays)) => format!("{rays} rays"),
-        _ => "–".to_owned(),
-    }
+/// A column's title with its unit.
+fn title(column: &Column) -> String {
+    if column.unit.is_empty() { column.title.to_owned() } else { format!("{} {}", column.title, column.unit) }
 }
 
 /// A row in a sentence.
 pub(super) fn name(row: &Row) -> String {
     match (row.params.points_per_m2, row.params.hz) {
-        (Some(_), Some(_)) => format!("{} ({})", row.method, setting(&row.params)),
+        (Some(n), Some(hz)) => format!("{} (N {n}, {hz} Hz)", row.method),
         _ => row.method.clone(),
     }
 }
@@ -118,14 +69,13 @@ pub(super) fn sentence(results: &Results, advice: &super::results::Advice) -> St
     }
 }
 
-/// Titles and cells of the columns that any row fills.
+/// Titles and cells of the columns that any row of the case fills.
 fn lines(case: &Case) -> Vec<Vec<String>> {
-    let rows: Vec<[String; COLUMNS.len()]> = case.rows.iter().map(cells).collect();
-    let filled = |column: usize| rows.iter().any(|cells| cells[column] != "–");
-    let columns: Vec<usize> = (0..COLUMNS.len()).filter(|&c| c < 2 || filled(c)).collect();
-    let titles = columns.iter().map(|&c| COLUMNS[c].0.to_owned()).collect();
-    let picked = rows.iter().map(|cells| columns.iter().map(|&c| cells[c].clone()).collect());
-    std::iter::once(titles).chain(picked).collect()
+    let columns = filled(std::slice::from_ref(case));
+    let named = ["method", "setting"].map(str::to_owned);
+    let titles = named.into_iter().chain(columns.iter().map(|column| title(column))).collect();
+    let rows = case.rows.iter().zip(settings(case));
+    std::iter::once(titles).chain(rows.map(|(row, setting)| cells(row, &setting, &columns))).collect()
 }
 
 fn aligned(lines: &[Vec<String>]) -> String {

@@ -3,7 +3,6 @@
 //! Words and the table are made here and read well without scripts; plots and the viewer of pictures are the page's own
 //! scripts over one island of JSON. Pictures are elements of their own, so that only those looked at are decoded.
 
-mod columns;
 mod island;
 mod pictures;
 #[cfg(test)]
@@ -16,7 +15,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 
-use super::results;
+use super::{columns, results};
 use crate::picture::write_file;
 use results::Results;
 use words::escape;

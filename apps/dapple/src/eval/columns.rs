@@ -1,4 +1,4 @@
-//! The columns of the table: the same for the page's table, its plots and its words.
+//! The columns of results: the same for tables of text, for the page's table, its plots and its words.
 
 use serde::Serialize;
 
@@ -122,7 +122,8 @@ pub(super) const COLUMNS: [Column; 16] = [
         ..cost("mrays", "rays", "M", 1)
     },
     Column {
-        explanation: "time after everything moved at once until the error stays within a tenth of its last value",
+        explanation: "time after everything moved at once, just after a server step, until a twentieth of the squared \
+            difference to what is shown in the end is left",
         kind: Kind::Other,
         get: |row| Some(exact(row.settling.as_ref()?.settled_s? * 1e3)),
         ..cost("settled_ms", "settles", "ms", 0)
