@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use dapple_scene::glam::{Mat4, Vec3};
 use dapple_scene::{PosedCamera, Projection};
 use serde::Serialize;
 
@@ -14,7 +15,7 @@ use super::stage::{Frame, Stage};
 use super::truth::Cache;
 use super::work::Work;
 use crate::args::{PictureFormat, ReferenceArgs};
-use crate::exr_file::{write_gray, write_rgb};
+use crate::exr_file::write_rgb;
 use crate::picture::write_file;
 use crate::source;
 
@@ -134,7 +135,7 @@ fn trace(
         let camera = stage.path.camera(scene, &scene.pose_undeformed(time_s));
         entries.push(FrameEntry {
             time_s,
-            world_from_view: dapple_scene::glam::Mat4::from(camera.world_from_view).to_cols_array(),
+            world_from_view: Mat4::from(camera.world_from_view).to_cols_array(),
             projection: projection(&camera),
             noise_rms: frame.noise_mse.sqrt(),
             beauty,
@@ -153,7 +154,9 @@ fn write(out: &Path, frame: &Frame, format: PictureFormat, [beauty, visibility]:
         PictureFormat::Exr => {
             let (width, height) = (truth.width, truth.height);
             write_rgb(&out.join(format!("{beauty}.exr")), width, height, truth.radiance())?;
-            write_gray(&out.join(format!("{visibility}.exr")), width, height, truth.visibility())
+            // Three equal channels: not every reader takes one.
+            let gray: Vec<Vec3> = truth.visibility().iter().map(|v| Vec3::splat(*v)).collect();
+            write_rgb(&out.join(format!("{visibility}.exr")), width, height, &gray)
         }
     }
 }
