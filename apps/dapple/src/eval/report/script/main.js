@@ -163,7 +163,9 @@ function start() {
   startContents();
   const command = document.getElementById("command");
   command.closest(".command").append(copyButton("Copy", () => command.textContent));
-  if (location.hash.startsWith("#see:")) document.getElementById("pictures").scrollIntoView();
+  if (location.hash.startsWith("#see:")) {
+    document.getElementById("pictures").scrollIntoView({ behavior: "instant" });
+  }
 }
 
 // Pictures come after the scripts: the page stands before they are all there.

@@ -136,6 +136,11 @@ const USE: &str = "
     facts.reads = document.querySelector('.readout').textContent;
     return facts;";
 
+const LINKED: &str = "
+    const pressed = [...document.querySelectorAll('#viewer .segments [aria-pressed=true]')].map((b) => b.textContent);
+    return [...pressed, document.querySelector('.moment').textContent, ...[...document.querySelectorAll('.tile b')].map((b) => b.textContent),
+      Math.abs(document.getElementById('pictures').getBoundingClientRect().top) < 100];";
+
 fn assert_quiet(report: &Value) {
     assert_eq!(report["errors"], json!([]), "{report:#}");
     assert_eq!(report["requests"], json!([]), "{report:#}");
@@ -155,6 +160,10 @@ fn a_browser_shows_everything_and_answers() {
         json!({ "file": file, "width": 1280, "height": 800, "script": LOOK }),
         json!({ "file": file, "width": 390, "height": 844, "dark": true, "touch": true, "script": LOOK }),
         json!({ "file": file, "width": 1280, "height": 800, "script": USE }),
+        json!({
+            "file": file, "hash": "#see:frame=1,view=error,mode=pair,a=1,b=99,zoom=2", "width": 1280, "height": 800,
+            "script": LINKED,
+        }),
     ];
     let reports = drive(&tools, page.path(), &views);
     for report in &reports[..2] {
@@ -196,6 +205,9 @@ fn a_browser_shows_everything_and_answers() {
     assert_ne!(facts["themeBefore"], facts["themeAfter"], "{report:#}");
     let read = facts["reads"].as_str().unwrap();
     assert!(read.starts_with("10, 6") && read.contains("truth"), "pixels of a file can be read: {read}");
+    assert_quiet(&reports[3]);
+    let sight = json!(["Error", "Pair", "2 of 2, 1.00 s", "psao-hat · N 512, 15 Hz", "none", true]);
+    assert_eq!(reports[3]["result"], sight, "an address leads to what it names: {:#}", reports[3]);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 // Opens report pages as files in a browser and reports what each showed.
 //
 // node driver.mjs PLAN.json, where the plan is
-//   { browser, modules, views: [{ file, width, height, dark?, touch?, script }] }
+//   { browser, modules, views: [{ file, hash?, width, height, dark?, touch?, script }] }
 // `modules` is the folder of node modules with playwright-core. `script` is the body of an async function that is run
 // in the page. A JSON array of { width, errors, requests, result } is printed: errors and warnings of the console, and
 // requests for anything that is not a file or in the page.
@@ -23,7 +23,7 @@ try {
 }
 console.log(JSON.stringify(reports));
 
-async function open({ file, width, height, dark, touch, script }) {
+async function open({ file, hash, width, height, dark, touch, script }) {
   const report = { width, errors: [], requests: [], result: null };
   const context = await browser.newContext({
     viewport: { width, height },
@@ -41,7 +41,7 @@ async function open({ file, width, height, dark, touch, script }) {
     if (!/^(file|data|blob):/.test(request.url())) report.requests.push(request.url());
   });
   try {
-    await tab.goto(pathToFileURL(file).href);
+    await tab.goto(pathToFileURL(file).href + (hash ?? ""));
     await tab.waitForFunction(() => document.documentElement.classList.contains("scripts"), null, { timeout: 15_000 });
     report.result = await tab.evaluate((script) => Object.getPrototypeOf(async () => {}).constructor(script)(), script);
   } catch (error) {
