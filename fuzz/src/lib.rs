@@ -3,6 +3,7 @@
 //! Ordinary tests replay the corpus and mutate it (`tests/replay.rs`); cargo-fuzz runs the same functions
 //! (`README.md`).
 
+mod camera_path;
 pub mod corpus;
 mod frame;
 mod input;
@@ -11,6 +12,7 @@ mod scene;
 mod session;
 mod soup;
 
+pub use camera_path::read_camera_path;
 pub use frame::decode_frame;
 pub use input::Random;
 pub use recording::read_recording;
@@ -22,10 +24,11 @@ pub use soup::triangle_soup;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 5] = [
+pub const TARGETS: [Target; 6] = [
     ("decode_frame", decode_frame),
     ("session_ops", session_ops),
     ("read_recording", read_recording),
     ("load_scene", load_scene),
+    ("read_camera_path", read_camera_path),
     ("triangle_soup", triangle_soup),
 ];

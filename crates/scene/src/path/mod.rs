@@ -1,16 +1,22 @@
-//! Ways to look at a scene: the cameras of the file, and a computed orbit that always exists.
+//! Ways to look at a scene: the cameras of the file, a computed orbit that always exists, and paths of keys.
 
+mod file;
+mod keys;
 mod orbit;
 
-use crate::{Pose, PosedCamera, Scene};
+use std::sync::Arc;
 
+use crate::{Animation, Pose, PosedCamera, Scene};
+
+pub use file::{MAX_PATH_BYTES, PathError};
+pub use keys::{Aim, Blend, CameraKey, KeyedPath, MAX_KEYS, MAX_NAME_BYTES};
 pub use orbit::Orbit;
 use orbit::{ORBIT_PERIOD_S, orbit};
 
 /// A camera that may move, by name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraPath {
-    /// The camera node's name, or `orbit`. Unique within a scene's list: repetitions get a number.
+    /// The camera node's name, `orbit`, or that of the keys. Unique within a scene's list: repetitions get a number.
     pub name: String,
     /// Where it comes from.
     pub source: CameraSource,
@@ -32,15 +38,25 @@ pub enum CameraSource {
     },
     /// Computed from the scene's bounds.
     Orbit(Orbit),
+    /// Keys that are not the scene's own: recorded, or read from a file.
+    Keys(Arc<KeyedPath>),
+}
+
+impl From<KeyedPath> for CameraPath {
+    fn from(keys: KeyedPath) -> CameraPath {
+        let (name, duration_s) = (keys.name().to_owned(), keys.duration_s());
+        CameraPath { name, source: CameraSource::Keys(Arc::new(keys)), duration_s }
+    }
 }
 
 impl CameraPath {
-    /// Seconds after which the path repeats; 0 for a camera that stands still.
+    /// Seconds after which the path repeats, or ends if it is of keys that do not repeat; 0 for a camera that stands still.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }
 
-    /// The camera at the time of `pose`, which must be a pose of `scene`, from whose list this path came.
+    /// The camera at the time of `pose`, which must be a pose of `scene`, from whose list this path came (unless it is of
+    /// keys, which fit any scene).
     pub fn camera(&self, scene: &Scene, pose: &Pose) -> PosedCamera {
         match &self.source {
             CameraSource::Animated { node } | CameraSource::Still { node } => {
@@ -52,24 +68,19 @@ impl CameraPath {
                 }
             }
             CameraSource::Orbit(orbit) => orbit.at(pose.time),
+            CameraSource::Keys(keys) => keys.camera(pose.time),
         }
     }
 }
 
 impl Scene {
     /// All ways to look at the scene: cameras the active animation moves, in node order; then cameras that stand
-    /// still; then a computed `orbit`, always the last.
+    /// still; then a computed `orbit`, always the last. A camera that only another animation moves stands still:
+    /// [`Scene::animations_of_camera`] tells which do.
     pub fn camera_paths(&self) -> Vec<CameraPath> {
         let animation = self.active_animation.and_then(|i| self.animations.get(i as usize));
         let duration_s = animation.map_or(0.0, |animation| f64::from(animation.duration()));
-        let mut moves = vec![false; self.nodes.len()];
-        for channel in animation.iter().flat_map(|animation| &animation.channels) {
-            let rigid = channel.target != crate::ChannelTarget::MorphWeights;
-            moves[channel.node as usize] |= rigid && channel.times.len() > 1;
-        }
-        for (i, node) in self.nodes.iter().enumerate() {
-            moves[i] |= node.parent.is_some_and(|parent| moves[parent as usize]);
-        }
+        let moves = self.moved_nodes(animation);
         let mut paths: Vec<CameraPath> = Vec::new();
         for animated in [true, false] {
             for (i, node) in self.nodes.iter().enumerate() {
@@ -86,6 +97,33 @@ impl Scene {
         let source = CameraSource::Orbit(orbit(self));
         paths.push(CameraPath { name: free_name(&paths, "orbit"), source, duration_s: ORBIT_PERIOD_S });
         paths
+    }
+
+    /// Indices of the animations that move the camera of a path; none if it is not a camera of the file.
+    pub fn animations_of_camera(&self, path: &CameraPath) -> Vec<u32> {
+        let (CameraSource::Animated { node } | CameraSource::Still { node }) = path.source else {
+            return Vec::new();
+        };
+        let moves =
+            |animation: &Animation| self.moved_nodes(Some(animation)).get(node as usize) == Some(&true);
+        (0..)
+            .zip(&self.animations)
+            .filter(|(_, animation)| moves(animation))
+            .map(|(index, _)| index)
+            .collect()
+    }
+
+    /// Which nodes an animation moves, by themselves or with a parent.
+    fn moved_nodes(&self, animation: Option<&Animation>) -> Vec<bool> {
+        let mut moves = vec![false; self.nodes.len()];
+        for channel in animation.iter().flat_map(|animation| &animation.channels) {
+            let rigid = channel.target != crate::ChannelTarget::MorphWeights;
+            moves[channel.node as usize] |= rigid && channel.times.len() > 1;
+        }
+        for (i, node) in self.nodes.iter().enumerate() {
+            moves[i] |= node.parent.is_some_and(|parent| moves[parent as usize]);
+        }
+        moves
     }
 }
 

@@ -17,7 +17,7 @@ const MIN_FREE_OF_DIAGONAL: f32 = 0.05;
 /// Hollow things with an outside are objects below this diagonal.
 const BUILDING_DIAGONAL_M: f32 = 10.0;
 /// Places that are tried for the middle of a room.
-const PLACES: usize = 9;
+const PLACES: usize = 12;
 /// Rays sent from each.
 const RAYS: usize = 14;
 /// Height of eyes above the floor, metres.
@@ -51,7 +51,7 @@ impl Orbit {
 
 /// The computed orbit: inside the scene if there is a room about its middle, else around it.
 ///
-/// From nine places 14 rays go out. A place is in a room if at least three in five of them first meet a front face (the
+/// From twelve places 14 rays go out. A place is in a room if at least three in five of them first meet a front face (the
 /// inside of a solid object shows back faces) and if it has some room to the sides. A hollow thing that is smaller
 /// than a building and whose outside is modelled too is an object all the same. In the roomiest place the camera
 /// walks a small circle and looks across it.
@@ -102,7 +102,7 @@ pub(super) fn orbit(scene: &Scene) -> Orbit {
     }
 }
 
-/// Places where the middle of a room may be: three heights at the centre and half way to both ends.
+/// Places where the middle of a room may be: four heights at the centre and half way to both ends.
 fn candidate_places(bounds: &Aabb) -> [Vec3; PLACES] {
     let size = bounds.max - bounds.min;
     // Scenes whose units are not metres have no sensible eye height.
@@ -110,8 +110,8 @@ fn candidate_places(bounds: &Aabb) -> [Vec3; PLACES] {
     let aside = if size.x >= size.z { 0.25 * size.x * Vec3::X } else { 0.25 * size.z * Vec3::Z };
     let floor = Vec3::new(bounds.center().x, bounds.min.y, bounds.center().z);
     std::array::from_fn(|i| {
-        let height = [eye, 0.25 * size.y, 0.5 * size.y][i % 3];
-        floor + height * Vec3::Y + [0.0, 1.0, -1.0][i / 3] * aside
+        let height = [eye, 0.25 * size.y, 0.5 * size.y, 0.65 * size.y][i % 4];
+        floor + height * Vec3::Y + [0.0, 1.0, -1.0][i / 4] * aside
     })
 }
 
