@@ -10,6 +10,13 @@ use dapple_stream::{
 
 use crate::input::{Input, Random};
 
+/// A camera path of each kind.
+const TARGETS_JSON: &str = r#"{"version":1,"name":"a","loop":true,"keys":[
+{"time_s":0,"eye":[1,2,0],"target":[0,1,0],"fov_degrees":50},{"time_s":1.5,"eye":[0,2,1],"target":[0,1,0],"near_m":0.1},
+{"time_s":4,"eye":[1,2,0],"target":[0,1,0]}]}"#;
+const ROTATIONS_JSON: &str = r#"{"version":1,"name":"b","interpolation":"linear","keys":[
+{"time_s":0.5,"eye":[-3,1.25,2e1],"rotation":[0,0,0,1]},{"time_s":2,"eye":[0,1,1],"rotation":[0,0.6,0,0.8]}]}"#;
+
 /// The store that seeds and targets have in common: regular enough that its sections compress.
 pub(crate) fn sample() -> PointStore {
     let mut bytes = vec![2, 0];
@@ -96,6 +103,10 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
         ("two-groups", &[(0, &snapshot), (500_000, &delta), (1_250_000, &snapshot), (2_000_000, &delta)][..]),
     ] {
         seeds.push(("read_recording", name.to_owned(), recording(name, frames)));
+    }
+
+    for (name, json) in [("targets", TARGETS_JSON), ("rotations", ROTATIONS_JSON)] {
+        seeds.push(("read_camera_path", name.to_owned(), json.as_bytes().to_vec()));
     }
 
     let scenes = [("scene.glb", scenes::glb()), ("scene.gltf", scenes::gltf()), ("scene.obj", scenes::obj())];

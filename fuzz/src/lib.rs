@@ -3,6 +3,7 @@
 //! Ordinary tests replay the corpus and mutate it (`tests/replay.rs`); cargo-fuzz runs the same functions
 //! (`README.md`).
 
+mod camera_path;
 pub mod corpus;
 mod frame;
 mod input;
@@ -12,6 +13,7 @@ mod session;
 mod soup;
 mod weights;
 
+pub use camera_path::read_camera_path;
 pub use frame::decode_frame;
 pub use input::Random;
 pub use recording::read_recording;
@@ -29,6 +31,7 @@ pub const TARGETS: [Target; 6] = [
     ("session_ops", session_ops),
     ("read_recording", read_recording),
     ("load_scene", load_scene),
+    ("read_camera_path", read_camera_path),
     ("triangle_soup", triangle_soup),
     ("read_weights", read_weights),
 ];

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Context, Result, bail};
-use dapple_scene::{CameraPath, Files, Scene, builtin};
+use dapple_scene::path::MAX_PATH_BYTES;
+use dapple_scene::{CameraPath, CameraSource, Files, KeyedPath, Scene, builtin};
 
 use crate::args::{CameraText, Radius, SceneChoice, VisibilityArgs};
 use crate::progress::Bar;
@@ -107,26 +108,64 @@ fn find_animation(scene: &Scene, wanted: &str) -> Result<u32> {
     }
 }
 
-/// The camera path of that name, or the scene's first.
+/// The camera path of that name, that of a file whose name ends in `.json`, or the scene's first.
 pub(crate) fn find_path(scene: &Scene, wanted: Option<&str>) -> Result<CameraPath> {
     let mut paths = scene.camera_paths();
     let Some(wanted) = wanted else { return Ok(paths.swap_remove(0)) };
+    if is_path_file(wanted) {
+        return read_path(Path::new(wanted));
+    }
     match paths.iter().position(|p| p.name == wanted) {
-        Some(index) => Ok(paths.swap_remove(index)),
+        Some(index) => {
+            let path = paths.swap_remove(index);
+            if let Some(hint) = stands_still(scene, &path) {
+                tracing::warn!("{hint}");
+            }
+            Ok(path)
+        }
         None => {
             let known: Vec<&str> = paths.iter().map(|p| p.name.as_str()).collect();
-            bail!("there is no camera path {wanted}; this scene's are {}", known.join(", "))
+            bail!(
+                "there is no camera path {wanted}; this scene's are {} (a file of keys ends in .json)",
+                known.join(", ")
+            )
         }
     }
 }
 
-/// A camera given as text or by the name of one of the scene's camera paths.
+/// Whether a camera path's name is that of a file.
+pub(crate) fn is_path_file(name: &str) -> bool {
+    Path::new(name).extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"))
+}
+
+/// Reads a camera path of keys.
+fn read_path(file: &Path) -> Result<CameraPath> {
+    let bytes = read_limited(file, MAX_PATH_BYTES as u64)
+        .with_context(|| format!("cannot read the camera path {}", file.display()))?;
+    let keys = KeyedPath::parse(&bytes).with_context(|| format!("the camera path {}", file.display()))?;
+    Ok(keys.into())
+}
+
+/// What to say of a camera that stands still although animations that are not active would move it.
+fn stands_still(scene: &Scene, path: &CameraPath) -> Option<String> {
+    if !matches!(path.source, CameraSource::Still { .. }) {
+        return None;
+    }
+    let movers = scene.animations_of_camera(path);
+    let names: Vec<&str> =
+        movers.iter().filter_map(|&i| Some(scene.animations.get(i as usize)?.name.as_str())).collect();
+    (!names.is_empty()).then(|| {
+        format!("the camera {} stands still: it moves with --animation {}", path.name, names.join(" or "))
+    })
+}
+
+/// A camera given as text, or a camera path by [`find_path`] at a time.
 pub(crate) fn find_camera(
     scene: &Scene,
     text: Option<&str>,
     time_s: f64,
 ) -> Result<dapple_scene::PosedCamera> {
-    if let Some(text) = text.filter(|t| t.contains('=')) {
+    if let Some(text) = text.filter(|text| is_camera_text(text)) {
         let camera: CameraText = text.parse().map_err(anyhow::Error::msg)?;
         let mut posed =
             dapple_scene::PosedCamera::look_at(camera.eye, camera.target, camera.fov_degrees.to_radians());
@@ -137,8 +176,13 @@ pub(crate) fn find_camera(
         return Ok(posed);
     }
     let path = find_path(scene, text)
-        .context("--camera takes a camera path's name or eye=X,Y,Z,target=X,Y,Z,fov=DEGREES")?;
+        .context("--camera takes a camera path's name, its file or eye=X,Y,Z,target=X,Y,Z,fov=DEGREES")?;
     Ok(path.camera(scene, &scene.pose(time_s)))
+}
+
+/// Whether a camera is given by its numbers.
+pub(crate) fn is_camera_text(text: &str) -> bool {
+    text.contains('=') && !is_path_file(text)
 }
 
 /// The occlusion distance in metres, and the factor on points per m² that goes with it.

@@ -27,7 +27,7 @@ pub use light::{Light, LightKind, PosedLight};
 pub use load::{Files, LoadError, MeshOrigin, NoFiles, Origins, load, load_with_origins, read_reference};
 pub use material::{AlphaMode, Filter, Image, Material, NormalTexture, Texture, TextureRef, Wrap};
 pub use mesh::{Mesh, MorphTarget, Part, SkinInfluences};
-pub use path::{CameraPath, CameraSource};
+pub use path::{CameraPath, CameraSource, KeyedPath};
 pub use pose::{DeformedMesh, Pose, PosedInstance};
 pub use scene::{Aabb, Instance, LocalTransform, Node, Scene, SceneHash, Skin, Warning};
 

@@ -197,6 +197,56 @@ fn cameras_and_lights() {
     assert_eq!(pose.lights.len(), 1);
 }
 
+#[test]
+fn cameras_move_with_the_active_animation() {
+    let mut b = Builder::default();
+    let times = b.floats("SCALAR", &[0.0, 2.0]);
+    let ride = b.floats("VEC3", &[0.0, 0.0, 0.0, 4.0, 0.0, 0.0]);
+    let turn = Quat::from_rotation_y(1.0);
+    let turns = b.floats("VEC4", &[Quat::IDENTITY.to_array(), turn.to_array()].concat());
+    // The rig carries one camera, turns with it, and is moved by "ride" alone; "spin" turns the other; "wobble" neither.
+    let mut scene = loaded(&b.glb(&format!(
+        r#""cameras":[{{"type":"perspective","perspective":{{"yfov":1.0,"znear":0.1}}}}],
+        "nodes":[{{"name":"rig","children":[1]}},{{"name":"aboard","camera":0,"translation":[0,1,2]}},
+                 {{"name":"tripod","camera":0,"translation":[9,1,0]}},{{"name":"thing"}}],
+        "animations":[
+            {{"name":"wobble","samplers":[{{"input":{times},"output":{ride}}}],
+              "channels":[{{"sampler":0,"target":{{"node":3,"path":"translation"}}}}]}},
+            {{"name":"ride","samplers":[{{"input":{times},"output":{ride}}},{{"input":{times},"output":{turns}}}],
+              "channels":[{{"sampler":0,"target":{{"node":0,"path":"translation"}}}},
+                          {{"sampler":1,"target":{{"node":0,"path":"rotation"}}}}]}},
+            {{"name":"spin","samplers":[{{"input":{times},"output":{turns}}}],
+              "channels":[{{"sampler":0,"target":{{"node":2,"path":"rotation"}}}}]}}]"#
+    )));
+    let list = |scene: &dapple_scene::Scene| -> Vec<(String, f64)> {
+        scene.camera_paths().into_iter().map(|path| (path.name.clone(), path.duration_s())).collect()
+    };
+    let orbit = ("orbit".to_owned(), 20.0);
+    let [aboard, tripod] = ["aboard", "tripod"].map(str::to_owned);
+    assert_eq!(list(&scene), [(aboard.clone(), 0.0), (tripod.clone(), 0.0), orbit.clone()]);
+    // The list tells which animations would move them.
+    let movers: Vec<Vec<u32>> = scene.camera_paths().iter().map(|p| scene.animations_of_camera(p)).collect();
+    assert_eq!(movers, [vec![1], vec![2], vec![]]);
+
+    scene.set_active_animation(Some(1));
+    assert_eq!(list(&scene), [(aboard.clone(), 2.0), (tripod.clone(), 0.0), orbit.clone()]);
+    let path = &scene.camera_paths()[0];
+    for (time, x, angle) in [(0.0, 0.0, 0.0), (1.0, 2.0, 0.5), (1.5, 3.0, 0.75)] {
+        let camera = path.camera(&scene, &scene.pose(time));
+        let turn = Quat::from_rotation_y(angle);
+        let eye = Vec3::new(x, 0.0, 0.0) + turn * Vec3::new(0.0, 1.0, 2.0);
+        assert!(camera.eye_world().distance(eye) < 1e-5, "at {time}: {}", camera.eye_world());
+        let ahead = camera.world_from_view.transform_vector3(Vec3::NEG_Z);
+        assert!(ahead.distance(turn * Vec3::NEG_Z) < 1e-5, "at {time}: {ahead}");
+    }
+    let still = scene.camera_paths()[1].camera(&scene, &scene.pose(1.0));
+    assert_eq!(still.eye_world(), Vec3::new(9.0, 1.0, 0.0));
+
+    // The one that moves comes first.
+    scene.set_active_animation(Some(2));
+    assert_eq!(list(&scene), [(tripod, 2.0), (aboard, 0.0), orbit]);
+}
+
 /// A PNG of 2 × 1 texels, red and green, made with an independent encoder.
 fn png() -> Vec<u8> {
     let mut bytes = Vec::new();

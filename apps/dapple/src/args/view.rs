@@ -13,6 +13,7 @@ Examples:
   dapple view --builtin atrium --detail 0.5 --points 256 --hz 5
   dapple view room.glb --stream room.dapple      plays a recording (dapple record)
   dapple view --url http://127.0.0.1:8000/       what a page there shows (dapple demo)
+  dapple view room.glb --camera walk.json        along a camera path that was recorded (R) or written by hand
   dapple view --builtin atrium --headless --frames 8 --view texels --size 640x360 -o out/texels
 
 In the window H or F1 lists the keys.";
@@ -58,8 +59,8 @@ pub(crate) struct ViewArgs {
     /// Seconds that an update fades in over; 0 for none [default: as long as updates are apart, at most half a second; 0 with --headless].
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) fade: Option<f32>,
-    /// A camera of the scene by name, or one given as eye=X,Y,Z,target=X,Y,Z,fov=DEGREES (vertical)
-    /// [default: the scene's first camera path].
+    /// A camera of the scene by name, a camera path's FILE.json, or one given as eye=X,Y,Z,target=X,Y,Z,fov=DEGREES
+    /// (vertical) [default: the scene's first camera path].
     #[arg(long, value_name = "CAMERA")]
     pub(crate) camera: Option<String>,
     /// Animation time to begin at, seconds.
@@ -71,6 +72,9 @@ pub(crate) struct ViewArgs {
     /// Size of window or pictures in pixels.
     #[arg(long, value_name = "WxH", default_value = "1280x720")]
     pub(crate) size: Size,
+    /// Where camera paths are recorded to (R) [default: camera-path-1.json, or the next number that is free].
+    #[arg(long, value_name = "FILE.json", conflicts_with = "headless")]
+    pub(crate) record_path: Option<PathBuf>,
     /// Write pictures instead of opening a window.
     #[arg(long)]
     pub(crate) headless: bool,

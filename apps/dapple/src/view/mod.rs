@@ -8,6 +8,7 @@ mod overlay;
 mod paint;
 mod picture;
 mod quality;
+mod record_path;
 mod retries;
 mod screen;
 mod session;
@@ -26,6 +27,7 @@ use crate::source;
 
 use feed::{Feed, Player};
 use quality::Quality;
+use session::Outputs;
 use show::{Opening, start_server};
 use steer::Steering;
 
@@ -40,7 +42,8 @@ pub(crate) fn run(args: &ViewArgs) -> Result<()> {
         return headless::run(args, opening);
     }
     let screenshots = args.out.clone().unwrap_or_else(|| PathBuf::from("."));
-    window::run(opening, args.size, screenshots, args.paused, args.time)
+    let outputs = Outputs { screenshots, camera_paths: args.record_path.clone() };
+    window::run(opening, args.size, outputs, args.paused, args.time)
 }
 
 fn check(args: &ViewArgs) -> Result<()> {
@@ -55,6 +58,14 @@ fn check(args: &ViewArgs) -> Result<()> {
     }
     if args.fade.is_some_and(|seconds| !(0.0..=10.0).contains(&seconds)) {
         bail!("--fade must be 0 to 10 seconds");
+    }
+    if let Some(file) = &args.record_path {
+        if !source::is_path_file(&file.to_string_lossy()) {
+            bail!("--record-path {} would hold a camera path: name it .json", file.display());
+        }
+        if file.exists() {
+            bail!("--record-path {}: it exists; choose another name", file.display());
+        }
     }
     Ok(())
 }

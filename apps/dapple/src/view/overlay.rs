@@ -11,7 +11,7 @@ use crate::args::Preset;
 const PANEL_WIDTH: f32 = 240.0;
 
 /// Every key and what it does.
-pub(super) const KEYS: [(&str, &str); 16] = [
+pub(super) const KEYS: [(&str, &str); 17] = [
     ("drag", "turn; on foot: look around"),
     ("right drag, Shift drag", "move sideways"),
     ("wheel", "come closer, go back"),
@@ -19,6 +19,7 @@ pub(super) const KEYS: [(&str, &str); 16] = [
     ("O", "orbit or on foot"),
     ("C", "next camera of the scene"),
     ("F", "all of the scene"),
+    ("R", "record a camera path; stop and write it"),
     ("Space", "pause, go on"),
     ("Left, Right, Home", "one update back or ahead, the beginning"),
     ("M", "next method"),
@@ -41,6 +42,8 @@ pub(super) struct Overlay {
     notice: Option<(String, f64)>,
     /// An error that stays.
     pub(super) failure: Option<String>,
+    /// Seconds of the camera path that is being recorded.
+    pub(super) recorded_s: Option<f64>,
 }
 
 /// What the overlay asks for that it cannot do itself.
@@ -105,7 +108,9 @@ impl Overlay {
         let preparing = show.feed.preparing();
         // What stays as it is until something else is shown.
         let lasting = [self.failure.as_deref(), show.problem()];
-        if self.notice.is_none() && preparing.is_none() && lasting == [None; 2] {
+        let recording =
+            self.recorded_s.map(|seconds| format!("recording the camera: {seconds:.1} s; R stops"));
+        if self.notice.is_none() && preparing.is_none() && recording.is_none() && lasting == [None; 2] {
             return;
         }
         egui::Area::new(egui::Id::unique("messages"))
@@ -118,6 +123,9 @@ impl Overlay {
                         ui.add(bar.text(format!("{what} {:.0} %", 100.0 * part)));
                     }
                     for text in lasting.into_iter().flatten() {
+                        ui.label(RichText::new(text).color(Color32::LIGHT_RED));
+                    }
+                    if let Some(text) = recording {
                         ui.label(RichText::new(text).color(Color32::LIGHT_RED));
                     }
                     if let Some((text, _)) = &self.notice {

@@ -16,6 +16,7 @@ use super::overlay::{Overlay, Wish};
 use super::paint::Painter;
 use super::picture;
 use super::quality::{METHODS, Quality, VIEWS, next_of};
+use super::record_path::{Going, PathRecorder, write_new};
 use super::retries::Retries;
 use super::screen::{Next, Screen};
 use super::show::{Opening, Show};
@@ -55,7 +56,9 @@ pub(super) struct Session {
     painter: Painter,
     screen: Screen,
     overlay: Overlay,
-    screenshots: PathBuf,
+    outputs: Outputs,
+    /// A camera path that is being recorded.
+    recorder: Option<PathRecorder>,
     pointer: Pointer,
     /// Which of [`WALK_KEYS`] are held.
     held: [bool; 6],
@@ -64,6 +67,14 @@ pub(super) struct Session {
     drawn_s: f64,
     /// Devices and surfaces that were made anew.
     retries: Retries,
+}
+
+/// Where pictures and camera paths are written to.
+pub(super) struct Outputs {
+    /// Folder of screenshots.
+    pub(super) screenshots: PathBuf,
+    /// File of camera paths; `None` is a numbered one in the current folder.
+    pub(super) camera_paths: Option<PathBuf>,
 }
 
 #[derive(Default)]
@@ -75,7 +86,7 @@ struct Pointer {
 }
 
 impl Session {
-    pub(super) fn new(screen: Screen, opening: Opening, screenshots: PathBuf) -> Result<Session> {
+    pub(super) fn new(screen: Screen, opening: Opening, outputs: Outputs) -> Result<Session> {
         let show = Show::new(&screen.gpu, opening, screen.format())?;
         let painter = Painter::new(&screen);
         let mut overlay = Overlay::default();
@@ -85,7 +96,8 @@ impl Session {
             painter,
             screen,
             overlay,
-            screenshots,
+            outputs,
+            recorder: None,
             pointer: Pointer::default(),
             held: [false; 6],
             draw_until_s: 1.0,
@@ -117,6 +129,7 @@ impl Session {
                 self.linger(now_s);
             }
         }
+        self.record(now_s);
         let stale = now_s > self.drawn_s + self.overlay.stale_after_s() && !self.overlay.hidden;
         now_s < self.draw_until_s
             || stale
@@ -280,6 +293,7 @@ impl Session {
                 let (width, height) = self.screen.size();
                 show.steering.fit(&scene, time_s, width as f32 / height as f32);
             }
+            KeyCode::KeyR => self.toggle_recording(now_s),
             KeyCode::KeyM => show.options.method = next_of(&METHODS, show.options.method),
             KeyCode::KeyB => {
                 show.options.split = match show.options.split {
@@ -303,11 +317,50 @@ impl Session {
         Ok(())
     }
 
+    /// Begins to record the camera, or stops and writes what was recorded.
+    fn toggle_recording(&mut self, now_s: f64) {
+        if self.recorder.is_some() {
+            self.stop_recording(now_s);
+        } else {
+            self.recorder = Some(self.show.recorder());
+            self.record(now_s);
+        }
+    }
+
+    /// Takes the present camera, if one is recorded.
+    fn record(&mut self, now_s: f64) {
+        let Some(recorder) = &mut self.recorder else { return };
+        let time_s = self.show.clock.time_s();
+        let going = recorder.take(time_s, &self.show.steering.camera(&self.show.scene, time_s));
+        self.overlay.recorded_s = Some(recorder.seconds());
+        if going == Going::Ended {
+            self.stop_recording(now_s);
+        }
+    }
+
+    /// Writes the camera path that is being recorded, if one is, says where, and offers it as a camera.
+    pub(super) fn stop_recording(&mut self, now_s: f64) {
+        let Some(recorder) = self.recorder.take() else { return };
+        self.overlay.recorded_s = None;
+        let seconds = recorder.seconds();
+        let text = match write_new(recorder, self.outputs.camera_paths.as_deref()) {
+            Ok((file, path)) => {
+                let keys = path.keys().len();
+                self.show.add_path(path);
+                format!("wrote {}: {seconds:.1} s of the camera in {keys} keys", file.display())
+            }
+            Err(error) => format!("no camera path: {error:#}"),
+        };
+        say!("{text}");
+        self.overlay.tell(text, now_s);
+        self.linger(now_s);
+    }
+
     /// Writes what is shown into the next free numbered file, and says so.
     fn screenshot(&mut self, now_s: f64) {
         let size = self.screen.size();
         let written = picture::take(&self.screen.gpu, &mut self.show, size, now_s).and_then(|pixels| {
-            let path = free_name(&self.screenshots);
+            let path = free_name(&self.outputs.screenshots);
             write_png(&path, size.0, size.1, &pixels)?;
             Ok(path)
         });

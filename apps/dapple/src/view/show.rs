@@ -8,13 +8,14 @@ use dapple_client::rate::Rate;
 use dapple_client::viewer::{DrawOptions, LoadProgress, Viewer, ViewerConfig, ViewerStats};
 use dapple_gpu::{Gpu, wgpu};
 use dapple_render::shade::ShadeParams;
-use dapple_scene::Scene;
+use dapple_scene::{KeyedPath, Scene};
 use dapple_server::ServerConfig;
 use dapple_stream::PublisherConfig;
 
 use super::feed::{Feed, group_of};
 use super::live::Live;
 use super::quality::Quality;
+use super::record_path::PathRecorder;
 use super::steer::Steering;
 use crate::args::LightArgs;
 use crate::light::{scene_seconds, server_config};
@@ -75,7 +76,7 @@ impl Show {
         let Opening { scene, title, feed, steering, options, quality, light } = opening;
         let viewer = Viewer::new(gpu, scene.clone(), viewer_config(&quality, format))?;
         let mut clock = Clock::default();
-        clock.set_extent(scene_seconds(&scene), f64::INFINITY);
+        clock.set_extent(extent_s(&scene, &steering), f64::INFINITY);
         Ok(Show {
             scene,
             title,
@@ -94,6 +95,19 @@ impl Show {
             last_s: None,
             logged: None,
         })
+    }
+
+    /// What records its camera.
+    pub(super) fn recorder(&self) -> PathRecorder {
+        PathRecorder::new(self.steering.diagonal_m(), self.clock.duration_s())
+    }
+
+    /// Offers a camera path beside the scene's own.
+    pub(super) fn add_path(&mut self, path: KeyedPath) {
+        self.steering.add(path.into());
+        if self.feed.extent_s().is_none() {
+            self.clock.set_extent(extent_s(&self.scene, &self.steering), f64::INFINITY);
+        }
     }
 
     pub(super) fn quality(&self) -> Quality {
@@ -226,6 +240,11 @@ impl Show {
             progress: self.progress,
         }
     }
+}
+
+/// Seconds after which the clock begins again: those of the scene, or of a longer camera path that is not its own.
+fn extent_s(scene: &Scene, steering: &Steering) -> f64 {
+    scene_seconds(scene).max(steering.added_s())
 }
 
 /// A server for the scene, whose groups begin at `first_group`.

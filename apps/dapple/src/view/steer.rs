@@ -3,7 +3,7 @@
 use anyhow::Result;
 use dapple_client::controls::Controls;
 use dapple_scene::glam::Vec3;
-use dapple_scene::{CameraPath, PosedCamera, Projection, Scene};
+use dapple_scene::{CameraPath, CameraSource, PosedCamera, Projection, Scene};
 
 use crate::source;
 
@@ -35,15 +35,41 @@ impl Steering {
     /// On the camera that `text` names or describes, or the scene's first path.
     pub(super) fn new(scene: &Scene, text: Option<&str>, time_s: f64) -> Result<Steering> {
         let paths = scene.camera_paths();
-        let aim = match text {
-            Some(text) if text.contains('=') => Aim::Still(source::find_camera(scene, Some(text), time_s)?),
-            _ => {
-                let wanted = source::find_path(scene, text)?.name;
-                Aim::Path(paths.iter().position(|path| path.name == wanted).unwrap_or(0))
-            }
-        };
         let diagonal_m = scene.bounds_world(&scene.pose(0.0)).diagonal();
-        Ok(Steering { paths, aim, yfov: DEFAULT_YFOV, direction: Vec3::ZERO, diagonal_m })
+        let mut steering =
+            Steering { paths, aim: Aim::Path(0), yfov: DEFAULT_YFOV, direction: Vec3::ZERO, diagonal_m };
+        if let Some(text) = text.filter(|text| source::is_camera_text(text)) {
+            steering.aim = Aim::Still(source::find_camera(scene, Some(text), time_s)?);
+            return Ok(steering);
+        }
+        let wanted = source::find_path(scene, text)?;
+        steering.aim = Aim::Path(match steering.paths.iter().position(|path| *path == wanted) {
+            Some(index) => index,
+            None => steering.add(wanted),
+        });
+        Ok(steering)
+    }
+
+    /// Adds a camera path that is not the scene's own, by its name or a numbered one; returns its number.
+    pub(super) fn add(&mut self, mut path: CameraPath) -> usize {
+        let names: Vec<&str> = self.paths.iter().map(|path| path.name.as_str()).collect();
+        let numbered = (2..).map(|n| format!("{} {n}", path.name));
+        let free =
+            std::iter::once(path.name.clone()).chain(numbered).find(|name| !names.contains(&name.as_str()));
+        path.name = free.unwrap_or_default();
+        self.paths.push(path);
+        self.paths.len() - 1
+    }
+
+    /// Seconds of the longest camera path that is not the scene's own.
+    pub(super) fn added_s(&self) -> f64 {
+        let added = self.paths.iter().filter(|path| matches!(path.source, CameraSource::Keys(_)));
+        added.map(CameraPath::duration_s).fold(0.0, f64::max)
+    }
+
+    /// The scene's diagonal at its start, metres.
+    pub(super) fn diagonal_m(&self) -> f32 {
+        self.diagonal_m
     }
 
     /// The camera at a time of the scene, seconds.

@@ -1,6 +1,5 @@
 //! The window: events in, pictures and the overlay out.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -12,7 +11,7 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::window::{Window, WindowId};
 
 use super::screen::Screen;
-use super::session::Session;
+use super::session::{Outputs, Session};
 use super::show::Opening;
 use crate::args::Size;
 
@@ -20,18 +19,12 @@ use crate::args::Size;
 const IDLE: Duration = Duration::from_millis(30);
 
 /// Shows what was opened until its window is closed.
-pub(super) fn run(
-    opening: Opening,
-    size: Size,
-    screenshots: PathBuf,
-    paused: bool,
-    time_s: f64,
-) -> Result<()> {
+pub(super) fn run(opening: Opening, size: Size, outputs: Outputs, paused: bool, time_s: f64) -> Result<()> {
     check_display()?;
     let event_loop =
         EventLoop::new().context("cannot open a window; --headless writes pictures without one")?;
     let started = Instant::now();
-    let start = Start { opening, size, screenshots, paused, time_s };
+    let start = Start { opening, size, outputs, paused, time_s };
     let mut app = App { start: Some(start), session: None, error: None, started, hidden: false };
     event_loop.run_app(&mut app).context("the window system failed")?;
     app.error.map_or(Ok(()), Err)
@@ -56,7 +49,7 @@ fn check_display() -> Result<()> {
 struct Start {
     opening: Opening,
     size: Size,
-    screenshots: PathBuf,
+    outputs: Outputs,
     paused: bool,
     time_s: f64,
 }
@@ -85,7 +78,7 @@ impl App {
             .create_window(attributes)
             .context("cannot open a window; --headless writes pictures without one")?;
         let screen = Screen::open(event_loop, Arc::new(window))?;
-        let mut session = Session::new(screen, start.opening, start.screenshots)?;
+        let mut session = Session::new(screen, start.opening, start.outputs)?;
         session.show.clock.seek(start.time_s);
         session.show.clock.set_playing(!start.paused);
         self.session = Some(session);
@@ -147,6 +140,11 @@ impl ApplicationHandler for App {
     }
 
     fn exiting(&mut self, _: &ActiveEventLoop) {
+        // What is still being recorded is kept.
+        let now_s = self.now_s();
+        if let Some(session) = &mut self.session {
+            session.stop_recording(now_s);
+        }
         // Before the event loop goes, which surfaces hold on to.
         self.session = None;
     }
