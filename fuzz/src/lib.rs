@@ -26,7 +26,7 @@ pub use weights::read_weights;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 6] = [
+pub const TARGETS: [Target; 7] = [
     ("decode_frame", decode_frame),
     ("session_ops", session_ops),
     ("read_recording", read_recording),

@@ -370,6 +370,12 @@ fn streams_are_recorded() {
     ] {
         assert!(told.contains(&says), "{says}: {told}");
     }
+    // Another setting's recording under the same name is not taken for it.
+    let made = std::fs::read(folder.path().join("hall.dapple")).unwrap();
+    evaluate(folder.path(), &[&ATRIUM[..], &record, &["--hz", "5"]].concat());
+    assert!(std::fs::read(folder.path().join("hall.dapple")).unwrap() != made);
+    evaluate(folder.path(), &[&ATRIUM[..], &record].concat());
+    assert!(std::fs::read(folder.path().join("hall.dapple")).unwrap() == made);
     // It is made again if it is gone, and several settings have several files.
     std::fs::remove_file(folder.path().join("hall.dapple")).unwrap();
     let hz = ["--hz", "5,15"];

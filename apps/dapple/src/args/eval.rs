@@ -48,7 +48,7 @@ pub(crate) struct EvalArgs {
     #[arg(long, conflicts_with_all = [
         "scenes", "builtin", "suite", "detail", "animation", "methods", "frames", "size", "points", "hz", "path",
         "seconds", "reference_rays", "supersample", "radius", "point_rays", "threshold", "seed", "ray_budget",
-        "rays_still", "hdr_flip", "record",
+        "rays_still", "hdr_flip", "record", "ppd",
     ])]
     pub(crate) smoke: bool,
     /// Threads; 0 is one for each core.
@@ -135,7 +135,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "N")]
     pub(crate) rays_still: Option<u32>,
     /// Also compute HDR-FLIP, on linear light before tone mapping (several times the work of FLIP).
-    #[arg(long, num_args = 0..=1, default_missing_value = "true", value_name = "BOOL")]
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL")]
     pub(crate) hdr_flip: Option<bool>,
 }
 

@@ -52,9 +52,10 @@ fn noise(case: &Case, advice: &mut Vec<String>) {
     let Some((mse, row)) = least.filter(|(mse, _)| noise_mse > NOISE_PART * mse) else { return };
     let name = table::name(row);
     let (noise, error) = (100.0 * case.truth.noise_rms, 100.0 * mse.sqrt());
-    // Stratified rays gain a little more than this.
-    let rays = f64::from(case.reference_rays) * noise_mse / (NOISE_PART * mse);
-    let enough = 2u64.saturating_pow(rays.log2().ceil().clamp(0.0, 16.0) as u32);
+    // What is measured contains the noise. Where it is all of it, any number of rays is a guess.
+    let own_mse = (mse - noise_mse).max(0.05 * mse);
+    let factor = noise_mse / (NOISE_PART * own_mse);
+    let enough = ((f64::from(case.reference_rays) * factor).ceil() as u64).next_power_of_two().min(65_536);
     let what = match noise_mse >= mse {
         true => format!(
             "the truth's own noise, {noise:.2} %, is as large as the error measured for {name}, {error:.2} %"

@@ -32,6 +32,8 @@ pub(super) enum Job {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Outcome {
     pub(super) rows: Vec<Row>,
+    /// Hash of the recording, if one was made.
+    pub(super) recording: Option<String>,
 }
 
 impl Outcome {
@@ -153,7 +155,8 @@ impl Job {
         let rows = lines.into_iter().zip(settlings);
         let rows =
             rows.map(|(line, settling)| line.finish(stage, pair.as_ref(), settling, desk.truth)).collect();
-        Ok((Outcome { rows }, recording))
+        let hash = recording.as_ref().map(|bytes| blake3::hash(bytes).to_hex().to_string());
+        Ok((Outcome { rows, recording: hash }, recording))
     }
 }
 
@@ -171,7 +174,9 @@ struct Line {
     method: Method,
     reconstruct_seconds: f64,
     looks: u32,
+    /// Of the pictures that were compared.
     rays: u64,
+    rays_of_look: u64,
     /// Visibility of the latest picture's pixels.
     visibility: Vec<f32>,
     frames: Vec<FrameRow>,
@@ -184,6 +189,7 @@ impl Line {
             reconstruct_seconds: 0.0,
             looks: 0,
             rays: 0,
+            rays_of_look: 0,
             visibility: Vec::new(),
             frames: Vec::new(),
         }
@@ -197,7 +203,7 @@ impl Line {
             (Method::Rtao { rays }, _, _) => {
                 let rays = stage.settings.rays_per_sample(rays);
                 let (indices, sites) = sites(stage.scene(), drawn);
-                self.rays += sites.len() as u64 * u64::from(rays);
+                self.rays_of_look = sites.len() as u64 * u64::from(rays);
                 // Other directions than the truth's, or it would be compared with a part of itself.
                 let seed = u64::from(stage.settings.seed) << 8 | 1;
                 let params = RtaoParams { rays, radius_m: stage.radius_m, seed };
@@ -225,6 +231,7 @@ impl Line {
         desk: &Desk<'_>,
     ) -> Result<()> {
         let visibility = self.look(stage, pair, &frame.drawn);
+        self.rays += self.rays_of_look;
         let shown = Shown::new(&frame.drawn, visibility.as_deref())?;
         let compared = Compared::new(&frame.truth, &shown, desk.judge, stage.settings.hdr_flip)?;
         let stem = format!("{}/{number:03}-{}", desk.folder, self.method);

@@ -48,10 +48,8 @@ impl Key {
 impl Journal {
     /// The journal of results in `out`; `fresh` forgets what was done before.
     pub(super) fn open(out: &Path, fresh: bool) -> Result<Journal> {
-        let folder = out.join("jobs");
-        if fresh && folder.exists() {
-            std::fs::remove_dir_all(&folder)
-                .with_context(|| format!("cannot remove {}", folder.display()))?;
+        if fresh {
+            forget(&out.join("jobs"))?;
         }
         let program = std::env::current_exe().context("cannot find the program's own file")?;
         let bytes = std::fs::read(&program)
@@ -87,6 +85,20 @@ impl Journal {
     }
 }
 
+/// Removes the files of finished jobs, and nothing else that may lie there.
+fn forget(folder: &Path) -> Result<()> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
+    for entry in entries {
+        let path = entry.with_context(|| format!("cannot read the folder {}", folder.display()))?.path();
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let is_hash = stem.len() == 16 && stem.bytes().all(|b| b.is_ascii_hexdigit());
+        if is_hash && path.extension().is_some_and(|e| e == "json") {
+            std::fs::remove_file(&path).with_context(|| format!("cannot remove {}", path.display()))?;
+        }
+    }
+    Ok(())
+}
+
 /// The first 16 hexadecimal digits.
 fn hex(hash: &blake3::Hash) -> String {
     hash.to_hex()[..16].to_owned()
@@ -118,7 +130,10 @@ mod tests {
         let bytes = std::fs::read(&file).unwrap();
         std::fs::write(&file, &bytes[..bytes.len() / 2]).unwrap();
         assert_eq!(journal.get(&key, none), None);
+        // What is not a job's stays.
+        let foreign = folder.path().join("jobs/thesis.json");
+        std::fs::write(&foreign, "").unwrap();
         let again = Journal::open(folder.path(), true).unwrap();
-        assert!(!again.file(&key).exists());
+        assert!(!again.file(&key).exists() && foreign.exists());
     }
 }

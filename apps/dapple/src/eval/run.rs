@@ -17,9 +17,10 @@ use super::stage::Stage;
 use super::truth::Cache;
 use super::work::Work;
 use crate::args::EvalArgs;
+use crate::inspect::MAX_RECORDING_BYTES;
 use crate::judge::Judge;
 use crate::picture::write_file;
-use crate::source::{self, Loaded};
+use crate::source::{self, Loaded, read_limited};
 
 /// What all cases of a run share.
 struct Run<'a> {
@@ -253,8 +254,13 @@ impl Run<'_> {
             Job::Points { .. } => self.record.map(|file| self.recording_file(file, stage, job, slug)),
             Job::Alone(_) => None,
         };
-        let recorded = record.as_ref().is_none_or(|file| file.is_file());
-        if recorded && let Some(outcome) = self.journal.get(&key, Outcome::files) {
+        // A file of that name may be another setting's.
+        let recorded = |outcome: &Outcome| match &record {
+            None => true,
+            Some(file) => read_limited(file, MAX_RECORDING_BYTES)
+                .is_ok_and(|bytes| outcome.recording == Some(blake3::hash(&bytes).to_hex().to_string())),
+        };
+        if let Some(outcome) = self.journal.get(&key, Outcome::files).filter(recorded) {
             self.reused += 1;
             self.work.finish(&what, work, false);
             return Ok(outcome);

@@ -79,6 +79,12 @@ impl<'a> Stage<'a> {
         let seconds = wanted.min(whole_s);
         let frame_times_s = frame_times(settings.frames, seconds);
         let count = frame_times_s.len();
+        if count < settings.frames as usize {
+            tracing::warn!(
+                "--frames {}: {seconds:.2} s have {count} at 60 Hz, which are compared",
+                settings.frames
+            );
+        }
         Stage {
             loaded,
             settings,
@@ -186,14 +192,16 @@ fn path_seconds(scene: &Scene, path: &CameraPath) -> f64 {
     [path.duration_s(), animated, 10.0].into_iter().find(|s| *s > 0.0).unwrap_or(10.0)
 }
 
-/// Times in the middle of `frames` equal pieces, on the client's frame grid.
+/// Times in the middle of `frames` equal pieces, on the client's frame grid; fewer where pieces are shorter than its steps.
 fn frame_times(frames: u32, seconds: f64) -> Vec<f64> {
-    (0..frames)
+    let mut times: Vec<f64> = (0..frames)
         .map(|i| {
             let middle = (f64::from(i) + 0.5) / f64::from(frames) * seconds;
             (middle * CLIENT_HZ).floor() / CLIENT_HZ
         })
-        .collect()
+        .collect();
+    times.dedup();
+    times
 }
 
 #[cfg(test)]
@@ -211,5 +219,6 @@ mod tests {
             let times = frame_times(n, 15.0);
             assert!(times.windows(2).all(|w| w[0] < w[1]) && times[times.len() - 1] < 15.0, "{n}");
         }
+        assert_eq!(frame_times(60, 0.1).len(), 6, "no picture twice");
     }
 }

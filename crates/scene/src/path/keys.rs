@@ -256,7 +256,7 @@ fn check(key: &CameraKey, earliest_s: f64, has_targets: bool) -> Result<(), (&'s
         }
         Aim::Rotation(rotation) if !has_targets => {
             let length = rotation.length();
-            if !((length - 1.0).abs() <= 0.01) {
+            if !(0.99..=1.01).contains(&length) {
                 return Err((
                     "rotation",
                     format!("its length is {length}: give a unit quaternion x, y, z, w"),
