@@ -164,7 +164,7 @@ fn errors_say_what_is_wrong_and_where() {
         ),
         (file("", &with("0", &format!(r#"{eye}, "target": [0, 0, 0]"#))), vec!["key 0, target", "eye"]),
         (file("", &with("0", &turn("[0, 0, 0, 2]"))), vec!["key 0, rotation", "length is 2"]),
-        (file("", &with("0", &turn("[0, 0, 0, 1e39]"))), vec!["key 0, rotation", "unit"]),
+        (file("", &with("0", &turn("[0, 0, 0, 1e38]"))), vec!["key 0, rotation", "unit"]),
         (
             file("", &format!("{good}, {}", with("1", &turn("[0, 0, 0, 1]")))),
             vec!["key 1, rotation", "all keys"],

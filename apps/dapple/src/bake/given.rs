@@ -1,6 +1,6 @@
 //! Which texture coordinates of a file can carry a bake: those in which no two triangles share a place.
 
-use dapple_scene::glam::DVec2;
+use dapple_scene::glam::{DVec2, Vec2};
 
 use super::layout::{PieceAt, pieces_by_material, uv_area, uv_corners};
 use super::plan::{MeshPlan, triangles_of};
@@ -12,8 +12,16 @@ const SIDE: usize = 1024;
 /// Part of the covered samples that may be covered twice, and of the surface that may have no place: slips of exporters.
 const SLIP: f64 = 2e-3;
 
-/// How far out of the unit square coordinates may lie by rounding.
+/// How far out of its unit square a triangle may reach by rounding.
 const OUTSIDE: f32 = 1e-4;
+
+/// The corners of a triangle brought to the unit square by whole numbers, as images repeat; `None` if it needs several
+/// repetitions.
+pub(crate) fn in_unit_square(corners: [Vec2; 3]) -> Option<[Vec2; 3]> {
+    let low = corners[0].min(corners[1]).min(corners[2]);
+    let corners = corners.map(|uv| uv - (low + OUTSIDE).floor());
+    corners.iter().all(|uv| uv.max_element() <= 1.0 + OUTSIDE).then_some(corners)
+}
 
 /// Pieces that lie apart from each other in one set of their own coordinates.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -88,9 +96,7 @@ impl Square {
         let instance = plan.copies[0].members[0] as usize;
         for t in triangles_of(mesh, pool.pieces[at.piece].part) {
             let corners = uv_corners(mesh, set, t);
-            if corners.iter().any(|uv| uv.min_element() < -OUTSIDE || uv.max_element() > 1.0 + OUTSIDE) {
-                return false;
-            }
+            let Some(corners) = in_unit_square(corners) else { return false };
             let area_m2 = surfaces.area_m2(instance, t);
             if uv_area(mesh, set, t) > 1e-12 {
                 self.placed_m2 += area_m2
@@ -130,5 +136,22 @@ impl Square {
         self.again as f64 <= SLIP * self.once as f64
             && self.lost_m2 <= SLIP * (self.placed_m2 + self.lost_m2)
             && self.placed_m2 > 0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangles_are_brought_to_the_unit_square_by_whole_numbers() {
+        let triangle = |x: f32, y: f32, size: f32| [[x, y], [x + size, y], [x, y + size]].map(Vec2::from);
+        assert_eq!(in_unit_square(triangle(0.25, 0.5, 0.5)), Some(triangle(0.25, 0.5, 0.5)));
+        assert_eq!(in_unit_square(triangle(3.25, -1.5, 0.5)), Some(triangle(0.25, 0.5, 0.5)));
+        assert_eq!(in_unit_square(triangle(0.0, 1.0, 1.0)), Some(triangle(0.0, 0.0, 1.0)));
+        // A hair below a whole number is that number.
+        assert_eq!(in_unit_square(triangle(-0.00005, 0.0, 1.0)), Some(triangle(-0.00005, 0.0, 1.0)));
+        assert_eq!(in_unit_square(triangle(0.75, 0.0, 0.5)), None);
+        assert_eq!(in_unit_square(triangle(f32::NAN, 0.0, 0.5)), None);
     }
 }

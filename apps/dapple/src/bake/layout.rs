@@ -8,7 +8,7 @@ use dapple_scene::glam::{DVec2, Vec2};
 use dapple_scene::{Mesh, Origins};
 
 use super::accessor::Attribute;
-use super::given::{Given, find_given};
+use super::given::{Given, find_given, in_unit_square};
 use super::plan::{Copy, MeshPlan, triangles_of};
 use super::surfaces::Surfaces;
 use super::unwrap::unwrap;
@@ -35,13 +35,15 @@ const TEXELS_OF_RADIUS: f64 = 12.0;
 const LEAST_SIDE: u32 = 1024;
 
 /// Part of an image that surfaces fill, about.
-const FILLED: f64 = 0.65;
+pub(crate) const FILLED: f64 = 0.65;
 
 /// An image to be baked.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Sheet {
     pub(crate) width: u32,
     pub(crate) height: u32,
+    /// Coordinates of the file may rely on it that images repeat.
+    pub(crate) repeats: bool,
     pub(crate) patches: Vec<Patch>,
 }
 
@@ -134,7 +136,7 @@ fn add_given(
     let side = (area_m2 / area_uv.max(1e-9)).sqrt() / texel_m;
     let side = (side.ceil().clamp(4.0, f64::from(settings.side)) as u32).next_power_of_two();
     let side = if side > settings.side { settings.side } else { side };
-    let mut sheet = Sheet { width: side, height: side, patches: Vec::new() };
+    let mut sheet = Sheet { width: side, height: side, repeats: true, patches: Vec::new() };
     let number = layout.sheets.len();
     for at in &group.pieces {
         let copy = first_copy(plans, at.plan);
@@ -142,7 +144,8 @@ fn add_given(
         let mesh = &surfaces.scene.meshes[plan.mesh];
         let piece = &plan.pools[at.pool].pieces[at.piece];
         for t in triangles_of(mesh, piece.part) {
-            let corners = uv_corners(mesh, group.set, t).map(|uv| uv * side as f32);
+            let Some(corners) = in_unit_square(uv_corners(mesh, group.set, t)) else { continue };
+            let corners = corners.map(|uv| uv * side as f32);
             sheet.patches.push(Patch { copy: copy as u32, triangle: t as u32, corners });
         }
         let reads = Reads { sheet: number, set: u32::from(group.set) };

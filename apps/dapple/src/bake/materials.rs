@@ -42,11 +42,18 @@ impl Wardrobe {
         others: BTreeMap<usize, usize>,
     ) -> Result<Wardrobe> {
         let mut textures = Vec::new();
-        // Bilinear, with mip maps; surfaces end before the border.
-        let sampler = json!({"magFilter": 9729, "minFilter": 9987, "wrapS": 33071, "wrapT": 33071});
-        let sampler = document.push_value(List::Samplers, &sampler)?;
+        // Bilinear, with mip maps. In new coordinates surfaces end before the border.
+        let mut samplers = BTreeMap::new();
+        for repeats in images.iter().map(|images| images.repeats) {
+            let wrap = if repeats { 10497 } else { 33071 };
+            let sampler = json!({"magFilter": 9729, "minFilter": 9987, "wrapS": wrap, "wrapT": wrap});
+            if let std::collections::btree_map::Entry::Vacant(free) = samplers.entry(repeats) {
+                free.insert(document.push_value(List::Samplers, &sampler)?);
+            }
+        }
         for (number, sheet) in images.iter().enumerate() {
             let suffix = if images.len() > 1 { format!(" {number}") } else { String::new() };
+            let sampler = samplers[&sheet.repeats];
             let mut add = |bytes: &[u8], name: String| -> Result<usize> {
                 let view = document.push_view(bytes, None)?;
                 let image = json!({"name": name, "mimeType": "image/png", "bufferView": view});

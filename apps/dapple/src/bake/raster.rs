@@ -193,7 +193,7 @@ mod tests {
             .zip(triangles)
             .map(|(triangle, corners)| Patch { copy: 0, triangle, corners: corners.map(Vec2::from) })
             .collect();
-        Sheet { width, height, patches }
+        Sheet { width, height, repeats: false, patches }
     }
 
     fn all(sheet: &Sheet, rows: u32) -> Vec<Texel> {

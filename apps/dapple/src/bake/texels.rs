@@ -20,6 +20,8 @@ const UNKNOWN: f32 = 0.02;
 
 /// The images of a sheet, as PNG files.
 pub(crate) struct Images {
+    /// Whether they repeat ([`Sheet::repeats`]).
+    pub(crate) repeats: bool,
     pub(crate) visibility: Vec<u8>,
     /// Bent normals in the space of the mesh's normals, −1 … 1 as 0 … 255.
     pub(crate) bent: Option<Vec<u8>>,
@@ -56,7 +58,7 @@ pub(crate) fn bake_sheet(
             Some(png(sheet, &rgb, image::ExtendedColorType::Rgb8)?)
         }
     };
-    Ok(Images { visibility, bent })
+    Ok(Images { repeats: sheet.repeats, visibility, bent })
 }
 
 /// A number 0 … 1 as a code, rounded.

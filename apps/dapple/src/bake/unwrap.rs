@@ -3,18 +3,30 @@
 
 use std::collections::HashMap;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use dapple_scene::Origins;
 use dapple_scene::glam::{Vec2, Vec3};
 use uvunwrap::{Density, MeshInput, Options, OutputMesh, Packing, Progress, Stage};
 
 use super::accessor::{Attribute, Component};
-use super::layout::{Layout, Patch, PieceAt, Reads, Settings, Sheet, first_copy, side_for, wanted_texel_m};
+use super::layout::{
+    FILLED, Layout, Patch, PieceAt, Reads, Settings, Sheet, first_copy, side_for, wanted_texel_m,
+};
 use super::plan::{MeshPlan, Piece, Pool, triangles_of};
 use super::surfaces::Surfaces;
 
 /// Above so many triangles charts are packed by their outlines only: holes stay empty, but it is much faster.
 const MANY: usize = 100_000;
+
+/// Charts of curved surfaces have about so many triangles at most, if those are of one size: laying one flat takes more than
+/// twice as long for twice as many. Seams are stitched, so that more of them do no harm.
+const TRIANGLES_OF_CHART: f64 = 4000.0;
+
+/// Widest angle between a triangle and its chart, degrees.
+const CHART_ANGLE: f32 = 50.0;
+
+/// Most images.
+const MOST_IMAGES: f64 = 64.0;
 
 /// Copies smaller than this part of the largest one of their mesh get finer texels instead.
 const LEAST_SCALE: f32 = 0.25;
@@ -57,6 +69,15 @@ pub(crate) fn unwrap(
             ..MeshInput::new(&mesh.positions, &mesh.indices)
         })
         .collect();
+    if let Some(texel_m) = settings.texel_m {
+        let images = area_m2 / (FILLED * (texel_m * f64::from(settings.side)).powi(2));
+        if images > MOST_IMAGES {
+            bail!(
+                "--texel {texel_m} would need {images:.0} images of {side}x{side}, more than {MOST_IMAGES}; try a longer one",
+                side = settings.side
+            );
+        }
+    }
     let triangles: usize = prepared.iter().map(|mesh| mesh.ignored.len()).sum();
     let density = match settings.texel_m {
         Some(texel_m) => {
@@ -71,6 +92,8 @@ pub(crate) fn unwrap(
     };
     let options = Options {
         density,
+        max_chart_angle: CHART_ANGLE,
+        max_chart_area: (area_m2 * TRIANGLES_OF_CHART / triangles.max(1) as f64) as f32,
         padding: settings.margin,
         packing: if triangles > MANY { Packing::Fast } else { Packing::Shape },
         max_chart_size: match settings.texel_m {
@@ -92,7 +115,7 @@ pub(crate) fn unwrap(
     let (width, cropped) = (atlas.width, atlas.height);
     let height = if 2 * cropped <= width { cropped.next_power_of_two() } else { width.max(cropped) };
     let first_sheet = layout.sheets.len();
-    let sheet = Sheet { width, height, patches: Vec::new() };
+    let sheet = Sheet { width, height, repeats: false, patches: Vec::new() };
     layout.sheets.extend(std::iter::repeat_n(sheet, atlas.page_count as usize));
     for (mesh, output) in prepared.iter().zip(&atlas.meshes) {
         let first_copy = first_copy(plans, mesh.plan);

@@ -23,14 +23,21 @@ fn container(json: &str, bin: &[u8]) -> Vec<u8> {
 
 /// The buffer of a file, its views and accessors, one of each a list.
 #[derive(Default)]
-struct Builder {
+pub(crate) struct Builder {
     bin: Vec<u8>,
     views: Vec<String>,
     accessors: Vec<String>,
 }
 
 impl Builder {
-    fn list(&mut self, component_type: u32, kind: &str, count: usize, bytes: &[u8], extra: &str) -> usize {
+    pub(crate) fn list(
+        &mut self,
+        component_type: u32,
+        kind: &str,
+        count: usize,
+        bytes: &[u8],
+        extra: &str,
+    ) -> usize {
         self.bin.resize(self.bin.len().next_multiple_of(4), 0);
         let (offset, length, view) = (self.bin.len(), bytes.len(), self.views.len());
         self.bin.extend(bytes);
@@ -41,7 +48,7 @@ impl Builder {
         view
     }
 
-    fn floats<const N: usize>(&mut self, kind: &str, values: &[[f32; N]]) -> usize {
+    pub(crate) fn floats<const N: usize>(&mut self, kind: &str, values: &[[f32; N]]) -> usize {
         let bytes: Vec<u8> = values.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect();
         // Positions and key times must state their range; others may.
         let range = |fold: fn(f32, f32) -> f32| {
@@ -52,13 +59,13 @@ impl Builder {
         self.list(5126, kind, values.len(), &bytes, &extra)
     }
 
-    fn indices(&mut self, values: &[u16]) -> usize {
+    pub(crate) fn indices(&mut self, values: &[u16]) -> usize {
         let bytes: Vec<u8> = values.iter().flat_map(|x| x.to_le_bytes()).collect();
         self.list(5123, "SCALAR", values.len(), &bytes, "")
     }
 
     /// The file, with further top-level properties (`"nodes":[…],…`).
-    fn glb(&self, rest: &str) -> Vec<u8> {
+    pub(crate) fn glb(&self, rest: &str) -> Vec<u8> {
         let (length, views, accessors) = (self.bin.len(), self.views.join(","), self.accessors.join(","));
         let json = format!(
             r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":{length}}}],"bufferViews":[{views}],"accessors":[{accessors}],{rest}}}"#

@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test binary uses its own part")]
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
+pub(crate) mod baked;
 pub(crate) mod command;
 pub(crate) mod made;
 
