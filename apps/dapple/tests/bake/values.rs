@@ -122,7 +122,8 @@ fn seams_read_the_same_on_both_sides() {
     let scene = load_glb(&at.path().join("baked.glb"));
     let mesh = &scene.meshes[0];
     // Edges by the places of their ends, with the triangle and where the edge's middle is on it.
-    let mut edges: std::collections::BTreeMap<[[u32; 3]; 2], Vec<(u32, [f32; 2])>> = Default::default();
+    type Ends = Vec<(u32, [f32; 2])>;
+    let mut edges: std::collections::BTreeMap<[[u32; 3]; 2], Ends> = Default::default();
     for (t, triangle) in (0u32..).zip(&mesh.triangles) {
         for (k, middle) in [[0.5, 0.0], [0.5, 0.5], [0.0, 0.5]].into_iter().enumerate() {
             let ends = [triangle[k], triangle[(k + 1) % 3]];
