@@ -88,7 +88,7 @@ pub(crate) struct TruthFrame {
 pub(crate) struct Figure {
     /// Absent where it would be infinite (PSNR of equal pictures).
     pub(crate) value: Option<f64>,
-    /// Half of its 95 % interval, for other frames of the same path; absent for a single frame.
+    /// Half of its 95 % interval, for other frames of the same path; absent for fewer than three.
     pub(crate) ci95: Option<f64>,
 }
 
@@ -132,14 +132,16 @@ pub(crate) struct Times {
     pub(crate) client_ms: f64,
 }
 
-/// The error after everything moved at once and then stood still.
+/// What is shown after everything moved at once and then stood still. The move comes just after a server step, the worst case.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Settling {
-    /// Seconds after the move.
+    /// Seconds after the move, one a client frame.
     pub(crate) after_s: Vec<f64>,
-    /// At each of them; absent where equal to the truth.
+    /// Against the truth after the move; absent where equal to it.
     pub(crate) visibility_psnr_db: Vec<Option<f64>>,
-    /// Seconds until the error stays within a tenth of its last value.
+    /// Root mean square difference of visibility to what is shown in the end, 0 … 1.
+    pub(crate) behind_rms: Vec<f64>,
+    /// Seconds until no more than a twentieth of the squared difference is left; absent where nothing changed in view.
     pub(crate) settled_s: Option<f64>,
 }
 

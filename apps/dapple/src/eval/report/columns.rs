@@ -122,7 +122,8 @@ pub(super) const COLUMNS: [Column; 16] = [
         ..cost("mrays", "rays", "M", 1)
     },
     Column {
-        explanation: "time after everything moved at once until the error stays within a tenth of its last value",
+        explanation: "time after everything moved at once until no more than a twentieth of the squared difference to what is \
+            shown in the end is left",
         kind: Kind::Other,
         get: |row| Some(exact(row.settling.as_ref()?.settled_s? * 1e3)),
         ..cost("settled_ms", "settles", "ms", 0)

@@ -68,6 +68,7 @@ fn row(case: &str, method: &str, points: Option<f32>, qualities_db: &[f64]) -> R
         settling: points.map(|_| Settling {
             after_s: vec![0.0, 0.1],
             visibility_psnr_db: vec![Some(20.0), None],
+            behind_rms: vec![0.1, 0.0],
             settled_s: Some(0.1),
         }),
         frames: frames.map(|(i, q)| frame(&format!("{case}-{i:03}-{method}"), i as f64, *q)).collect(),
