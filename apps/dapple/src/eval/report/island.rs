@@ -104,6 +104,7 @@ struct RowData<'a> {
 #[derive(Debug, Serialize)]
 struct SettlingData {
     after_s: Vec<f32>,
+    behind_rms: Vec<f32>,
     visibility_psnr_db: Vec<Option<f32>>,
 }
 
@@ -219,6 +220,7 @@ fn row_data<'a>(
         step_bytes: &row.step_bytes,
         settling: row.settling.as_ref().map(|settling| SettlingData {
             after_s: settling.after_s.iter().map(|&s| s as f32).collect(),
+            behind_rms: settling.behind_rms.iter().map(|&rms| rms as f32).collect(),
             visibility_psnr_db: settling.visibility_psnr_db.iter().map(|v| v.map(|v| v as f32)).collect(),
         }),
         frames: frame_metrics(&row.frames),

@@ -1,6 +1,6 @@
 // Along the path: each picture's figures, the bits of each second, and how errors settle after a move.
 
-const timeState = { one: 0, metric: null, bits: "second", rows: new Map() };
+const timeState = { one: 0, metric: null, bits: "second", settling: "behind", rows: new Map() };
 /** More rows than this are not shown unless asked for. */
 const ROWS_AT_FIRST = 4;
 
@@ -280,23 +280,38 @@ function drawBits(add, caseIndex, shown) {
   }
 }
 
+/** What is shown after a move: how far it is from what is shown in the end, or from the truth. */
+const SETTLING = {
+  behind: {
+    words: "behind what is shown in the end",
+    title: "RMS of visibility behind what is shown in the end, after a move of everything",
+    values: (settling) => settling.behind_rms,
+    format: { unit: "", digits: 4, zero: true },
+  },
+  truth: {
+    words: "visibility against the truth",
+    title: "visibility, dB, after a move of everything",
+    values: (settling) => settling.visibility_psnr_db,
+    format: { unit: "dB", digits: 2 },
+  },
+};
+
 function drawSettling(add, caseIndex, shown) {
   const found = cases[caseIndex];
   if (!found.rows.some((row) => row.settling)) return;
-  const title = "visibility, dB, after a move of everything";
+  const { title, values, format } = SETTLING[timeState.settling];
   const lines = shown
-    .filter((index) => found.rows[index].settling)
+    .filter((index) => found.rows[index].settling?.after_s.length)
     .map((index) => {
-      const { after_s, visibility_psnr_db } = found.rows[index].settling;
-      return { rows: [index], times: after_s.map((s) => s * 1000), values: visibility_psnr_db };
+      const { settling } = found.rows[index];
+      return { rows: [index], times: settling.after_s.map((s) => s * 1000), values: values(settling) };
     });
-  if (!lines.length) add(title, "None of the rows shown was looked at after a move.", true);
-  else
-    add(
-      title,
-      (inside) => linePlot(inside, caseIndex, lines, { unit: "dB", digits: 2, xUnit: "ms", xDigits: 0, tall: true }),
-      true,
-    );
+  if (!lines.length) {
+    add(title, "None of the rows shown was looked at after a move.", true);
+  } else {
+    const draw = (inside) => linePlot(inside, caseIndex, lines, { ...format, xUnit: "ms", xDigits: 0, tall: true });
+    add(title, draw, true);
+  }
 }
 
 function drawTimeLegend() {
@@ -372,6 +387,15 @@ function startTimelines() {
           drawTimeSection();
         },
       ),
+    );
+  }
+  if (cases.some((one) => one.rows.some((row) => row.settling))) {
+    const options = Object.entries(SETTLING).map(([key, { words }]) => [key, words]);
+    controls.append(
+      select("after a move", options, timeState.settling, (value) => {
+        timeState.settling = value;
+        drawTimeSection();
+      }),
     );
   }
   if (cases.length) all();
