@@ -8,6 +8,7 @@ mod bake;
 mod demo;
 mod eval;
 mod exr_file;
+mod file;
 mod inspect;
 mod judge;
 mod light;
@@ -51,6 +52,10 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     // Windows must be opened on the program's first thread.
     if let Command::View(args) = &cli.command {
         return view::run(args);
+    }
+    // A demo ends itself.
+    if !matches!(cli.command, Command::Demo(_)) {
+        file::watch_interrupts();
     }
     let threads = match &cli.command {
         Command::Eval(args) => match &args.verb {

@@ -14,7 +14,7 @@ use super::materials::{Wardrobe, count_worn};
 use super::plan::{MeshPlan, Pool, plan, split_instances};
 use super::surfaces::Surfaces;
 use super::sweep::{accessor_users, sweep, views_in_use};
-use super::texels::{Images, bake_sheet};
+use super::texels::{Images, bake_sheets};
 use super::vertices::{self, AtVertex, Density, Welded, bake_vertices, place_counts, spread};
 use crate::args::BakeArgs;
 use crate::args::bake::{Attribute, Instances, Into, Uv};
@@ -166,9 +166,7 @@ fn lay(
 fn images(args: &BakeArgs, surfaces: &Surfaces<'_>, layout: &Layout) -> Result<Vec<Images>> {
     let rows: usize = layout.sheets.iter().map(|sheet| sheet.height as usize).sum();
     let bar = Counter::new("texels", rows);
-    let bake =
-        |sheet| bake_sheet(surfaces, &layout.copies, sheet, args.margin, &|rows| bar.add(u64::from(rows)));
-    layout.sheets.iter().map(bake).collect()
+    bake_sheets(surfaces, layout, args.margin, &|rows| bar.add(u64::from(rows)))
 }
 
 /// How many primitives that are not baked wear each material.
