@@ -53,8 +53,9 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     if let Command::View(args) = &cli.command {
         return view::run(args);
     }
-    // A demo ends itself.
-    if !matches!(cli.command, Command::Demo(_)) {
+    // Those that write large files, which takes a while. The others may have drivers of graphics cards at work, which do not
+    // like to be ended in order.
+    if matches!(cli.command, Command::Bake(_) | Command::Record(_) | Command::Scene(_)) {
         file::watch_interrupts();
     }
     let threads = match &cli.command {

@@ -233,3 +233,21 @@ pub(crate) fn place_in_triangle(seed: u64, index: u32) -> [f32; 2] {
     let inwards = |x: f32| 1e-3 / 3.0 + 0.999 * x;
     [inwards(u), inwards(v)]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_hidden_on_both_does_not_tell_instances_apart() {
+        let at = |visibility: f32, hidden: bool| Measured { visibility, hidden, ..Measured::default() };
+        let open = [at(1.0, false), at(0.5, false), at(0.0, true), at(0.0, true)];
+        assert_eq!(difference(&open, &open), 0.0);
+        let inside = [at(1.0, false), at(0.5, false), at(1.0, true), at(0.7, true)];
+        assert_eq!(difference(&open, &inside), 0.0);
+        // Seen on one of them it counts: three places, one of which differs by 1.
+        let out = [at(1.0, false), at(0.5, false), at(1.0, false), at(0.0, true)];
+        assert!((difference(&open, &out) - (1.0f64 / 3.0).sqrt()).abs() < 1e-12);
+        assert_eq!(difference(&[at(0.0, true)], &[at(1.0, true)]), 0.0);
+    }
+}
