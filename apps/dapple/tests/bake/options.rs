@@ -357,6 +357,25 @@ fn arguments_that_make_no_sense_are_named() {
 }
 
 #[test]
+fn pieces_that_need_too_many_images_are_refused() {
+    // With its margin each square fills an image; their area alone would fill 30.
+    let mut builder = Builder::default();
+    let square =
+        |i: u16| [[0.0, 0.0], [0.0, 0.8], [0.8, 0.8], [0.8, 0.0]].map(|[x, z]| [x + f32::from(i), 0.0, z]);
+    let positions: Vec<[f32; 3]> = (0..80u16).flat_map(square).collect();
+    let indices: Vec<u16> = (0..80u16).flat_map(|i| [0, 1, 2, 0, 2, 3].map(|k| 4 * i + k)).collect();
+    let (positions, indices) = (builder.floats("VEC3", &positions), builder.indices(&indices));
+    let file = builder.glb(&format!(
+        r#""nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":{positions}}},"indices":{indices}}}]}}]"#
+    ));
+    let at = folder(&[("squares.glb", &file)]);
+    let arguments = ["bake", "squares.glb", "--rays", "4", "--texel", "0.1", "--margin", "2", "-o", "x.glb"];
+    let with_side = |side: &'static str| [&arguments[..], &["--texture-size", side]].concat();
+    fail(at.path(), &with_side("16"), &["80 images of 16x16", "more than 64", "--texture-size", "--margin"]);
+    succeed(at.path(), &with_side("256"));
+}
+
+#[test]
 fn a_time_chooses_the_pose() {
     let at = folder(&[("sheet.glb", &folding_sheet())]);
     let mean = |arguments: &[&str]| {
