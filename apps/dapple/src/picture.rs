@@ -11,7 +11,7 @@ use dapple_scene::Scene;
 use dapple_scene::glam::Vec3;
 use dapple_trace::rtao::Site;
 
-use crate::file::write_file;
+pub(crate) use crate::file::write_file;
 use crate::judge::Judge;
 
 /// Writes 8-bit sRGB pixels as a PNG.

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 
 use crate::args::{RecordArgs, SceneChoice};
-use crate::file::write_file;
 use crate::light::{Take, record};
+use crate::picture::write_file;
 use crate::source;
 
 pub(crate) fn run(args: &RecordArgs) -> Result<()> {

@@ -6,7 +6,7 @@ use anyhow::Result;
 use dapple_scene::builtin;
 
 use crate::args::SceneArgs;
-use crate::file::write_file;
+use crate::picture::write_file;
 use crate::progress::Bar;
 
 pub(crate) fn run(args: &SceneArgs) -> Result<()> {

@@ -8,9 +8,9 @@ use dapple_scene::{NoFiles, Scene, builtin};
 use dapple_stream::{Limits, Recording, codec};
 
 use crate::args::DemoArgs;
-use crate::file::write_file;
 use crate::light::{Take, record};
 use crate::page::{FILE_NAME, ViewerJson};
+use crate::picture::write_file;
 use crate::progress::Bar;
 use crate::source::Loaded;
 

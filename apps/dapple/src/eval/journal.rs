@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::file::write_file;
+use crate::picture::write_file;
 use crate::source::read_limited;
 
 /// The largest file that is read back.

@@ -32,7 +32,7 @@ use std::path::Path;
 use anyhow::Result;
 
 use crate::args::EvalArgs;
-use crate::file::write_file;
+use crate::picture::write_file;
 
 use plan::Plan;
 use results::Results;

@@ -20,7 +20,7 @@ use serde::Serialize;
 use super::samples::{Errors, Place, SampleParams, Samples};
 use super::thin::{Side, ThinScene};
 use crate::args::QualityArgs;
-use crate::file::write_file;
+use crate::picture::write_file;
 use crate::progress::Bar;
 use crate::source;
 

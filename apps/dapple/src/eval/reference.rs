@@ -16,7 +16,7 @@ use super::truth::Cache;
 use super::work::Work;
 use crate::args::{PictureFormat, ReferenceArgs};
 use crate::exr_file::write_rgb;
-use crate::file::write_file;
+use crate::picture::write_file;
 use crate::source;
 
 /// `truth.json`.

@@ -17,9 +17,9 @@ use super::stage::Stage;
 use super::truth::Cache;
 use super::work::Work;
 use crate::args::EvalArgs;
-use crate::file::write_file;
 use crate::inspect::MAX_RECORDING_BYTES;
 use crate::judge::Judge;
+use crate::picture::write_file;
 use crate::source::{self, Loaded, read_limited};
 
 /// What all cases of a run share.

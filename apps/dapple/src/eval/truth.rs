@@ -8,8 +8,7 @@ use dapple_scene::Scene;
 use dapple_trace::Tracer;
 use dapple_trace::rtao::{RtaoParams, Site, trace_visibility_with_progress};
 
-use crate::file::write_file;
-use crate::picture::sites;
+use crate::picture::{sites, write_file};
 use crate::source::read_limited;
 
 /// Raised when the same rays would give something else.

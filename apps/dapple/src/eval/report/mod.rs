@@ -16,7 +16,7 @@ use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 
 use super::{columns, results};
-use crate::file::write_file;
+use crate::picture::write_file;
 use results::Results;
 use words::escape;
 
