@@ -355,6 +355,63 @@ fn suites_run_every_case_and_flags_scale_them() {
 }
 
 #[test]
+fn a_scene_that_fails_does_not_cost_the_others() {
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("sheet.glb"), made::folding_sheet()).unwrap();
+    std::fs::write(folder.path().join("broken.glb"), b"glTF\x02\0\0\0 and no more").unwrap();
+    let small = ["--size", "64x48", "--frames", "1", "--reference-rays", "16", "--methods", "none"];
+    let run = |scenes: &[&str]| {
+        let arguments = [&["eval"], scenes, &small, &["--out", "o"]].concat();
+        let output = dapple(folder.path(), &arguments).output().unwrap();
+        assert!(!output.status.success());
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    let err = run(&["broken.glb", "sheet.glb"]);
+    assert!(err.contains("could not be evaluated") && err.contains("broken"), "{err}");
+    let at = folder.path().join("o");
+    let results = read(&at);
+    assert_eq!(results["cases"].as_array().unwrap().len(), 1);
+    let [failure] = &results["failures"].as_array().unwrap()[..] else { panic!("one failure") };
+    assert_eq!(failure["scene"], "broken");
+    assert!(
+        std::fs::read_to_string(at.join("report.html")).unwrap().contains("broken could not be evaluated")
+    );
+    // With nothing left there are no results.
+    std::fs::remove_dir_all(&at).unwrap();
+    std::fs::copy(folder.path().join("broken.glb"), folder.path().join("worse.glb")).unwrap();
+    assert!(run(&["broken.glb", "worse.glb"]).contains("none of the 2 scenes"));
+    assert!(!at.join("results.json").exists());
+}
+
+#[test]
+fn two_runs_do_not_share_a_folder() {
+    let folder = TempDir::new().unwrap();
+    let at = folder.path().join("o");
+    std::fs::create_dir(&at).unwrap();
+    let lock = std::fs::File::create(at.join("running.lock")).unwrap();
+    lock.lock().unwrap();
+    let arguments = [&ATRIUM[..], &["--methods", "none", "--out", "o"]].concat();
+    fail(folder.path(), &arguments, &["another evaluation", "--out"]);
+    drop(lock);
+    succeed(folder.path(), &arguments);
+}
+
+#[test]
+fn only_what_changes_at_rest_is_flicker() {
+    let folder = TempDir::new().unwrap();
+    let arguments = ["--methods", "psao,rtao-4,none", "--out", "o"];
+    let results = evaluate(folder.path(), &[&ATRIUM[..], &arguments].concat()).1;
+    let flicker: Vec<f64> = results["cases"][0]["rows"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|row| row["flicker"]["value"].as_f64().unwrap())
+        .collect();
+    // Points that nothing can reach keep their visibility; rays of another frame are others.
+    assert!(flicker[0] < 0.5 && flicker[1] > 10.0 && flicker[2] == 0.0, "{flicker:?}");
+}
+
+#[test]
 fn streams_are_recorded() {
     let folder = TempDir::new().unwrap();
     let record = ["--methods", "psao", "--record", "hall.dapple", "--out", "o"];

@@ -100,18 +100,6 @@ pub enum MetricError {
     /// The reference is black.
     #[error("the reference has no light in it, which no exposure shows: give the exposures")]
     Black,
-    /// A number of a series over time that cannot be.
-    #[error("number {index} of the {series} is {value}, but must be {range}")]
-    Series {
-        /// `"times"` or `"errors"`.
-        series: &'static str,
-        /// Index into the series.
-        index: usize,
-        /// The number found.
-        value: f64,
-        /// Numbers allowed.
-        range: &'static str,
-    },
     /// Numbers within the metric exceed what floats can hold.
     #[error("{metric} overflowed: its weights are too large to be those of a trained network")]
     Overflow {

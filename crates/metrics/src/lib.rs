@@ -12,7 +12,6 @@
 //! | [`flip_hdr()`] | lower, 0 when equal | linear sRGB of any brightness |
 //! | [`Lpips::distance`] | lower, 0 when equal | sRGB, 8 bits a channel |
 //! | [`Flicker`], [`StillFlicker`] | lower, 0 when steady | pictures of a sequence, any range |
-//! | [`settling`] | lower, sooner | an error over time |
 
 mod error;
 mod errors;
@@ -30,4 +29,4 @@ pub use flip::{Exposures, Flip, HdrFlip, PIXELS_PER_DEGREE, flip, flip_hdr, magm
 pub use lpips::{LPIPS_MAX_PIXELS, LPIPS_MIN_SIDE, Lpips, LpipsMap, WeightsError};
 pub use psnr::{psnr, psnr_masked};
 pub use ssim::{SSIM_MIN_SIDE, SsimMap, ssim, ssim_map};
-pub use temporal::{Flicker, Settling, StillFlicker, settling};
+pub use temporal::{Flicker, StillFlicker};

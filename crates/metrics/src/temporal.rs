@@ -1,4 +1,4 @@
-//! What changes from picture to picture: flicker of what stands still, and how an error goes after a move.
+//! What changes from picture to picture: flicker of what stands still.
 //!
 //! **Flicker** is the warping error over still points: the root mean square of `after(place of p) − before(p)` over all
 //! pixels p of all pairs of successive pictures whose surface stands still in the world and is seen in both. 0 is
@@ -154,61 +154,6 @@ impl StillFlicker {
     }
 }
 
-/// How an error went after a move, as [`settling`] finds it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settling {
-    /// The error in the end: the last one given.
-    pub settled_error: f64,
-    /// Seconds on the clock of the times given until the error stays within the tolerance above `settled_error`,
-    /// interpolated between the samples around the crossing; the first time if it always was. `None` where only the
-    /// last sample is within: it may not have settled yet.
-    pub settled_after_s: Option<f64>,
-    /// ∫ max(0, error − `settled_error`) dt over the times given, by trapezia; in units of the error times seconds.
-    pub excess: f64,
-}
-
-/// How an error goes after a move: `errors` (mean square ones, or any other ≥ 0) at `times_s`, which increase.
-/// `tolerance` ≥ 0 is a fraction: 0.1 counts the error as settled at up to 1.1 times the last one.
-///
-/// # Errors
-/// Lengths that differ, no samples, times that do not increase, an error or tolerance that is negative or not finite.
-pub fn settling(times_s: &[f64], errors: &[f64], tolerance: f64) -> Result<Settling, MetricError> {
-    if times_s.len() != errors.len() {
-        return Err(MetricError::LengthsDiffer { reference: times_s.len(), test: errors.len() });
-    }
-    let Some(&settled_error) = errors.last() else {
-        return Err(MetricError::Empty { width: 0, height: 0 });
-    };
-    let wrong = |series, range, index, value| Err(MetricError::Series { series, index, value, range });
-    if let Some(index) =
-        (0..times_s.len()).find(|&i| !times_s[i].is_finite() || i > 0 && times_s[i - 1] >= times_s[i])
-    {
-        return wrong("times", "later than the one before", index, times_s[index]);
-    }
-    let allowed = |v: f64| (0.0..f64::INFINITY).contains(&v);
-    if let Some(index) = errors.iter().position(|&e| !allowed(e)) {
-        return wrong("errors", "at least 0", index, errors[index]);
-    }
-    if !allowed(tolerance) {
-        let (name, range) = ("tolerance", "0 <= tolerance < infinity");
-        return Err(MetricError::Parameter { name, value: tolerance as f32, range });
-    }
-
-    let limit = settled_error * (1.0 + tolerance);
-    let settled_after_s = match errors.iter().rposition(|&e| e > limit) {
-        None if errors.len() == 1 => None,
-        None => Some(times_s[0]),
-        Some(above) if above + 2 >= errors.len() => None,
-        Some(above) => {
-            let (high, low) = (errors[above], errors[above + 1]);
-            Some(times_s[above] + (times_s[above + 1] - times_s[above]) * (high - limit) / (high - low))
-        }
-    };
-    let over = |i: usize| (errors[i] - settled_error).max(0.0);
-    let trapezia = (1..errors.len()).map(|i| 0.5 * (over(i - 1) + over(i)) * (times_s[i] - times_s[i - 1]));
-    Ok(Settling { settled_error, settled_after_s, excess: trapezia.sum() })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -318,59 +263,5 @@ mod tests {
         assert!(matches!(still.add(&infinite), Err(MetricError::NotFinite { .. })));
         still.add(&[1.0, 0.5]).unwrap();
         assert_eq!(still.map(), Some(vec![0.5, 0.0]));
-    }
-
-    #[test]
-    fn an_exponential_settles_when_its_formula_says() {
-        // s + d e^(−t / τ): within 10 % of s after τ ln(10 d / s); the excess is τ d.
-        let (s, d, tau) = (0.002f64, 0.05, 0.4);
-        let times: Vec<f64> = (0..=4000).map(|i| f64::from(i) * 0.002).collect();
-        let errors: Vec<f64> = times.iter().map(|t| s + d * (-t / tau).exp()).collect();
-        let found = settling(&times, &errors, 0.1).unwrap();
-        assert!((found.settled_error - s).abs() < 1e-8);
-        let after = found.settled_after_s.unwrap();
-        assert!((after - tau * (10.0 * d / s).ln()).abs() < 1e-4, "{after}");
-        assert!((found.excess - tau * d).abs() < 1e-6, "{found:?}");
-    }
-
-    #[test]
-    fn edges_of_settling() {
-        let at = |times: &[f64], errors: &[f64]| {
-            let found = settling(times, errors, 0.1).unwrap();
-            (found.settled_error, found.settled_after_s, found.excess)
-        };
-        assert_eq!(at(&[3.0], &[0.5]), (0.5, None, 0.0));
-        assert_eq!(at(&[1.0, 2.0, 4.0], &[0.5, 0.5, 0.5]), (0.5, Some(1.0), 0.0));
-        // Better than in the end is settled as well, and no excess.
-        assert_eq!(at(&[1.0, 2.0, 4.0], &[0.25, 0.5, 0.5]), (0.5, Some(1.0), 0.0));
-        // Falls to the very end.
-        assert_eq!(at(&[0.0, 1.0, 2.0], &[4.0, 2.0, 1.0]), (1.0, None, 2.0 + 0.5));
-        // Comes back once: what counts is when it stays.
-        assert_eq!(at(&[0.0, 1.0, 2.0, 3.0, 4.0], &[0.0, 0.0, 1.0, 0.0, 0.0]), (0.0, Some(3.0), 1.0));
-        let found = settling(&[0.0, 1.0, 2.0], &[2.0, 1.0, 1.0], 0.5).unwrap();
-        assert_eq!(found.settled_after_s, Some(0.5));
-    }
-
-    #[test]
-    fn series_that_make_no_sense_are_refused() {
-        let wrong = |times: &[f64], errors: &[f64]| settling(times, errors, 0.1).unwrap_err();
-        assert!(matches!(wrong(&[], &[]), MetricError::Empty { .. }));
-        assert!(matches!(wrong(&[1.0], &[]), MetricError::LengthsDiffer { .. }));
-        for times in [[1.0, 1.0], [1.0, 0.5], [0.0, f64::NAN], [0.0, f64::INFINITY]] {
-            assert!(matches!(
-                wrong(&times, &[1.0, 1.0]),
-                MetricError::Series { series: "times", index: 1, .. }
-            ));
-        }
-        for bad in [-0.1, f64::NAN, f64::INFINITY] {
-            assert!(matches!(
-                wrong(&[0.0, 1.0], &[bad, 1.0]),
-                MetricError::Series { series: "errors", index: 0, .. }
-            ));
-            assert!(matches!(
-                settling(&[0.0], &[1.0], bad),
-                Err(MetricError::Parameter { name: "tolerance", .. })
-            ));
-        }
     }
 }

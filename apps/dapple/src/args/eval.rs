@@ -86,6 +86,7 @@ pub(crate) struct Options {
     /// Methods to compare: psao, psao-mls, psao-hat (the paper's kernel on the same points; psao-hat-1.5: with 1.5 times its
     /// radius), rtao-R (R rays a pixel), none [default: psao,psao-hat,rtao-16,none].
     #[arg(long, value_delimiter = ',', value_name = "METHOD,…")]
+    #[serde(deserialize_with = "list")]
     pub(crate) methods: Option<Vec<Method>>,
     /// Pictures compared, evenly spread over the path [default: 4; 2 without a scene].
     #[arg(long, value_name = "N")]
@@ -96,13 +97,16 @@ pub(crate) struct Options {
     /// Points spawned a square metre (half are kept); several are evaluated in one run
     /// [default: 512; 256 without a scene].
     #[arg(long, value_delimiter = ',', value_name = "N,…")]
+    #[serde(deserialize_with = "list")]
     pub(crate) points: Option<Vec<f32>>,
     /// Server updates a second; several are evaluated in one run [default: 15].
     #[arg(long, value_delimiter = ',', value_name = "H,…")]
+    #[serde(deserialize_with = "list")]
     pub(crate) hz: Option<Vec<f64>>,
     /// Camera paths by name (an unknown name lists them), files of them (.json), or `all` that move
     /// [default: the scene's first].
     #[arg(long, value_delimiter = ',', value_name = "NAME,…")]
+    #[serde(deserialize_with = "list")]
     pub(crate) path: Option<Vec<String>>,
     /// Seconds of each path that are played [default: all of it; 2 without a scene].
     #[arg(long, value_name = "S")]
@@ -164,6 +168,30 @@ impl Options {
             hdr_flip: self.hdr_flip.or(other.hdr_flip),
         }
     }
+}
+
+/// In files, a list may be one value, and a text may hold several with commas between them, as on the command line.
+fn list<'de, T: FromStr<Err: std::fmt::Display>, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<Option<Vec<T>>, D::Error> {
+    let items = match List::deserialize(deserializer)? {
+        List::Many(items) => items,
+        List::One(item) => vec![item],
+    };
+    let texts = items.into_iter().flat_map(|item| match item {
+        Text::Text(text) => text.split(',').map(|part| part.trim().to_owned()).collect(),
+        Text::Number(number) => vec![number.to_string()],
+    });
+    let parse =
+        |text: String| T::from_str(&text).map_err(|help| D::Error::custom(format!("'{text}': {help}")));
+    texts.map(parse).collect::<Result<_, _>>().map(Some)
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum List {
+    Many(Vec<Text>),
+    One(Text),
 }
 
 /// In files, what has a text on the command line is that text, or a number where it is one.

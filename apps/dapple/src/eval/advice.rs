@@ -24,6 +24,19 @@ pub(super) fn of(case: &Case) -> Vec<String> {
             case.seconds
         ));
     }
+    let unfinished: Vec<String> = case
+        .rows
+        .iter()
+        .filter(|row| row.settling.as_ref().is_some_and(|settling| settling.unfinished))
+        .map(table::name)
+        .collect();
+    if !unfinished.is_empty() {
+        advice.push(format!(
+            "points still waited for rays when watching after the move ended, so there is no time until the light settles: \
+             {}; raise --ray-budget",
+            unfinished.join(", ")
+        ));
+    }
     let empty: Vec<String> =
         case.truth.frames.iter().filter(|f| f.covered_pixels == 0).map(seconds).collect();
     if !empty.is_empty() {
@@ -90,7 +103,8 @@ fn ties(case: &Case, advice: &mut Vec<String>) {
     }
 }
 
-fn errors(case: &Case, row: &Row) -> Vec<FrameError> {
+/// A row's errors of visibility, weighted by the pixels that show geometry.
+pub(super) fn errors(case: &Case, row: &Row) -> Vec<FrameError> {
     let weights = case.truth.frames.iter().map(|f| f.covered_pixels as f64);
     row.frames.iter().zip(weights).map(|(f, weight)| FrameError::new(f.visibility_psnr_db, weight)).collect()
 }

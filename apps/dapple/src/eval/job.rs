@@ -5,13 +5,15 @@ use std::time::Instant;
 use anyhow::Result;
 use dapple_client::{Drawn, Reconstruction};
 use dapple_metrics::Flicker;
+use dapple_render::compose::resolve_plane;
 use dapple_render::psao::{Hat, Kernel};
 use dapple_trace::rtao::{RtaoParams, trace_visibility};
 use serde::{Deserialize, Serialize};
 
 use super::figures::{FrameError, jackknife, mean, mean_of_all, pooled_psnr, root_mean_square};
 use super::pair::{Pair, Start, Starts};
-use super::results::{Figure, FrameRow, Params, Row, Settling, Times, Truth};
+use super::plan::CLIENT_HZ;
+use super::results::{Figure, FrameRow, Machine, Params, Row, Settling, Times, Truth};
 use super::settle::settle;
 use super::stage::{Frame, Stage};
 use super::truth::Cache;
@@ -136,11 +138,18 @@ impl Job {
             for line in &mut lines {
                 line.compare(stage, pair.as_ref(), &frame, number, desk)?;
             }
-            if let Some(pair) = &mut pair {
-                pair.advance(frame.next.time_s, stage)?;
-            }
-            for line in &mut lines {
-                line.see_flicker(stage, pair.as_ref(), &frame)?;
+            for &watched_s in &frame.watched_s {
+                let changed = match &mut pair {
+                    Some(pair) => pair.advance(watched_s, stage)?,
+                    None => true,
+                };
+                for line in &mut lines {
+                    line.see_flicker(stage, pair.as_ref(), &frame, watched_s, changed)?;
+                }
+                if pair.is_none() {
+                    // Its pictures do not depend on each other, so that one change is like all others.
+                    break;
+                }
             }
             progress(began + (1.0 - began) * (number + 1) as f64 / count as f64);
         }
@@ -177,8 +186,9 @@ struct Line {
     /// Of the pictures that were compared.
     rays: u64,
     rays_of_look: u64,
-    /// Visibility of the latest picture's pixels.
+    /// Visibility of the latest picture's pixels, as last seen, and how it flickered.
     visibility: Vec<f32>,
+    flicker: Flicker,
     frames: Vec<FrameRow>,
 }
 
@@ -191,12 +201,19 @@ impl Line {
             rays: 0,
             rays_of_look: 0,
             visibility: Vec::new(),
+            flicker: Flicker::new(),
             frames: Vec::new(),
         }
     }
 
-    /// One visibility a sample; all open for `None`.
-    fn look(&mut self, stage: &Stage<'_>, pair: Option<&Pair>, drawn: &Drawn) -> Option<Vec<f32>> {
+    /// One visibility a sample of what is drawn, at time `now_s`; all open for `None`.
+    fn look(
+        &mut self,
+        stage: &Stage<'_>,
+        pair: Option<&Pair>,
+        drawn: &Drawn,
+        now_s: f64,
+    ) -> Option<Vec<f32>> {
         let start = Instant::now();
         let visibility = match (self.method, pair, reconstruction(self.method)) {
             (_, Some(pair), Some(reconstruction)) => Some(pair.client.visibility(drawn, &reconstruction)),
@@ -204,8 +221,9 @@ impl Line {
                 let rays = stage.settings.rays_per_sample(rays);
                 let (indices, sites) = sites(stage.scene(), drawn);
                 self.rays_of_look = sites.len() as u64 * u64::from(rays);
-                // Other directions than the truth's, or it would be compared with a part of itself.
-                let seed = u64::from(stage.settings.seed) << 8 | 1;
+                // Other directions than the truth's, or it would be compared with a part of itself; and others in each frame.
+                let number = (now_s * CLIENT_HZ).round() as u64;
+                let seed = number << 40 | u64::from(stage.settings.seed) << 8 | 1;
                 let params = RtaoParams { rays, radius_m: stage.radius_m, seed };
                 let mut traced = vec![1.0; sites.len()];
                 trace_visibility(&stage.tracer_at(drawn), &sites, &params, &mut traced);
@@ -230,7 +248,7 @@ impl Line {
         number: usize,
         desk: &Desk<'_>,
     ) -> Result<()> {
-        let visibility = self.look(stage, pair, &frame.drawn);
+        let visibility = self.look(stage, pair, &frame.drawn, frame.time_s);
         self.rays += self.rays_of_look;
         let shown = Shown::new(&frame.drawn, visibility.as_deref())?;
         let compared = Compared::new(&frame.truth, &shown, desk.judge, stage.settings.hdr_flip)?;
@@ -252,23 +270,29 @@ impl Line {
             flip_map: maps.flip,
         });
         self.visibility = shown.into_visibility();
+        self.flicker = Flicker::new();
         Ok(())
     }
 
-    /// Compares what still places show now with what they showed a frame before.
-    fn see_flicker(&mut self, stage: &Stage<'_>, pair: Option<&Pair>, frame: &Frame) -> Result<()> {
-        let drawn = &frame.next.drawn;
-        let now = match self.look(stage, pair, drawn) {
-            Some(samples) => {
-                dapple_render::compose::resolve_plane(&drawn.gbuffer, &samples, 1.0)?.values.values
-            }
-            None => vec![1.0; self.visibility.len()],
+    /// Compares what still places show now with what they showed a client frame before.
+    fn see_flicker(
+        &mut self,
+        stage: &Stage<'_>,
+        pair: Option<&Pair>,
+        frame: &Frame,
+        now_s: f64,
+        changed: bool,
+    ) -> Result<()> {
+        let (drawn, before) = (&frame.drawn, std::mem::take(&mut self.visibility));
+        let now = match changed.then(|| self.look(stage, pair, drawn, now_s)).flatten() {
+            Some(samples) => resolve_plane(&drawn.gbuffer, &samples, 1.0)?.values.values,
+            None => before.clone(),
         };
         let (width, height) = (drawn.gbuffer.width, drawn.gbuffer.height);
-        let mut flicker = Flicker::default();
-        flicker.add(width, height, &self.visibility, &now, &frame.next.still)?;
+        self.flicker.add(width, height, &before, &now, &frame.still)?;
+        self.visibility = now;
         if let Some(last) = self.frames.last_mut() {
-            last.flicker = flicker.rms().map(|rms| 255.0 * rms);
+            last.flicker = self.flicker.rms().map(|rms| 255.0 * rms);
         }
         Ok(())
     }
@@ -327,6 +351,7 @@ impl Line {
             settling,
             frames: self.frames,
             times: Times {
+                machine: Machine::here(),
                 server_ms: pair.filter(|p| !p.step_bytes.is_empty()).map(|p| per_step(p.server_seconds, p)),
                 client_ms: 1e3 * self.reconstruct_seconds / f64::from(self.looks.max(1)) + apply_ms,
             },

@@ -50,11 +50,17 @@ impl Journal {
     pub(super) fn open(out: &Path, fresh: bool) -> Result<Journal> {
         if fresh {
             forget(&out.join("jobs"))?;
+            forget_pictures(&out.join("pictures"))?;
         }
         let program = std::env::current_exe().context("cannot find the program's own file")?;
         let bytes = std::fs::read(&program)
             .with_context(|| format!("cannot read the program's own file {}", program.display()))?;
         Ok(Journal { out: out.to_owned(), program: hex(&blake3::hash(&bytes)) })
+    }
+
+    /// Hash of the program's file, 16 hexadecimal digits.
+    pub(super) fn program(&self) -> &str {
+        &self.program
     }
 
     /// The name of a job, from everything that its outcome depends on.
@@ -99,6 +105,22 @@ fn forget(folder: &Path) -> Result<()> {
     Ok(())
 }
 
+/// Removes the folders of jobs' pictures, which end with a point and eight digits of the job's hash, and nothing else.
+fn forget_pictures(folder: &Path) -> Result<()> {
+    let Ok(cases) = std::fs::read_dir(folder) else { return Ok(()) };
+    for case in cases.flatten() {
+        for job in std::fs::read_dir(case.path()).into_iter().flatten().flatten() {
+            let path = job.path();
+            let end = path.extension().unwrap_or_default().to_string_lossy();
+            if path.is_dir() && end.len() == 8 && end.bytes().all(|b| b.is_ascii_hexdigit()) {
+                std::fs::remove_dir_all(&path)
+                    .with_context(|| format!("cannot remove {}", path.display()))?;
+            }
+        }
+    }
+    Ok(())
+}
+
 /// The first 16 hexadecimal digits.
 fn hex(hash: &blake3::Hash) -> String {
     hash.to_hex()[..16].to_owned()
@@ -133,7 +155,15 @@ mod tests {
         // What is not a job's stays.
         let foreign = folder.path().join("jobs/thesis.json");
         std::fs::write(&foreign, "").unwrap();
+        let pictures = folder.path().join("pictures/room");
+        for name in ["points-512-15hz.0123abcd/000.png", "mine/000.png", "notes.0123abcd"] {
+            let file = pictures.join(name);
+            std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+            std::fs::write(file, "").unwrap();
+        }
         let again = Journal::open(folder.path(), true).unwrap();
         assert!(!again.file(&key).exists() && foreign.exists());
+        assert!(!pictures.join("points-512-15hz.0123abcd").exists());
+        assert!(pictures.join("mine/000.png").exists() && pictures.join("notes.0123abcd").exists());
     }
 }

@@ -29,7 +29,7 @@ mod work;
 
 use std::path::Path;
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 
 use crate::args::EvalArgs;
 use crate::picture::write_file;
@@ -50,18 +50,29 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
         smoke::check(&results)?;
         say!("smoke: all bounds hold");
     }
-    Ok(())
+    match results.failures.as_slice() {
+        [] => Ok(()),
+        failures => {
+            let scenes: Vec<&str> = failures.iter().map(|f| f.scene.as_str()).collect();
+            bail!("could not be evaluated, for the reasons above: {}", scenes.join(", "))
+        }
+    }
 }
 
 /// Writes everything but the pictures, and says where the report lies.
 fn write(results: &Results, out: &Path) -> Result<()> {
-    write_file(&out.join("results.json"), &serde_json::to_vec_pretty(results)?)?;
-    write_file(&out.join("results.csv"), &export::rows_csv(results)?)?;
-    write_file(&out.join("frames.csv"), &export::frames_csv(results)?)?;
-    write_file(&out.join("results.md"), table::markdown(results).as_bytes())?;
+    write_tables(results, out)?;
     let report = out.join("report.html");
     write_file(&report, report::html(results, out)?.as_bytes())?;
     let shown = std::fs::canonicalize(&report).unwrap_or(report);
     say!("report: {}", shown.display());
     Ok(())
+}
+
+/// Writes the figures alone.
+fn write_tables(results: &Results, out: &Path) -> Result<()> {
+    write_file(&out.join("results.json"), &serde_json::to_vec_pretty(results)?)?;
+    write_file(&out.join("results.csv"), &export::rows_csv(results)?)?;
+    write_file(&out.join("frames.csv"), &export::frames_csv(results)?)?;
+    write_file(&out.join("results.md"), table::markdown(results).as_bytes())
 }

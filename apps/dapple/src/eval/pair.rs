@@ -134,6 +134,14 @@ pub(super) struct Pair {
     recording: Option<Recording>,
 }
 
+/// What an uncounted step did.
+pub(super) struct StepAt {
+    /// Whether the client's light changed.
+    pub(super) changed: bool,
+    /// Points left to later steps.
+    pub(super) backlog: u32,
+}
+
 /// What is kept of the stream.
 struct Recording {
     recorder: Recorder,
@@ -178,13 +186,14 @@ impl Pair {
         })
     }
 
-    /// Steps up to and including `until_s`; the client takes every frame.
-    pub(super) fn advance(&mut self, until_s: f64, stage: &Stage<'_>) -> Result<()> {
+    /// Steps up to and including `until_s`; the client takes every frame. Whether its light changed.
+    pub(super) fn advance(&mut self, until_s: f64, stage: &Stage<'_>) -> Result<bool> {
+        let mut changed = false;
         loop {
             let tick_s = (self.step_bytes.len() + 1) as f64 / self.hz;
             // The sum of many ticks must not lose the last one to rounding.
             if tick_s > until_s + 1e-9 {
-                return Ok(());
+                return Ok(changed);
             }
             let start = Instant::now();
             let interest = interest(tick_s, self.hz, self.ray_budget, stage);
@@ -197,6 +206,7 @@ impl Pair {
             let mut bytes = 0;
             if let Some(frame) = &report.frame {
                 bytes = frame.bytes.len() as u32;
+                changed = true;
                 self.client.receive(&frame.bytes).context("the client refused the server's frame")?;
             }
             self.apply_seconds += start.elapsed().as_secs_f64();
@@ -208,17 +218,15 @@ impl Pair {
         }
     }
 
-    /// Steps once with the scene at `time_s`, uncounted; whether the client's light changed.
-    pub(super) fn step_at(&mut self, time_s: f64, stage: &Stage<'_>) -> Result<bool> {
+    /// Steps once with the scene at `time_s`, uncounted.
+    pub(super) fn step_at(&mut self, time_s: f64, stage: &Stage<'_>) -> Result<StepAt> {
         let interest = interest(time_s, self.hz, self.ray_budget, stage);
         let input = StepInput { ray_budget: self.ray_budget, interest: &interest };
-        match self.server.step_with(time_s, &input)?.frame {
-            None => Ok(false),
-            Some(frame) => {
-                self.client.receive(&frame.bytes).context("the client refused the server's frame")?;
-                Ok(true)
-            }
+        let report = self.server.step_with(time_s, &input)?;
+        if let Some(frame) = &report.frame {
+            self.client.receive(&frame.bytes).context("the client refused the server's frame")?;
         }
+        Ok(StepAt { changed: report.frame.is_some(), backlog: report.counts.backlog })
     }
 
     pub(super) fn points(&self) -> u64 {

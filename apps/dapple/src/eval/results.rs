@@ -4,7 +4,7 @@ use dapple_trace::psao::update::StepCounts;
 use serde::{Deserialize, Serialize};
 
 /// Version of this schema.
-pub(crate) const SCHEMA: u32 = 2;
+pub(crate) const SCHEMA: u32 = 3;
 
 /// Everything one evaluation found.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -14,8 +14,11 @@ pub(crate) struct Results {
     pub(crate) title: String,
     pub(crate) run: RunInfo,
     pub(crate) machine: Machine,
+    pub(crate) judge: JudgeInfo,
     /// One scene along one path each.
     pub(crate) cases: Vec<Case>,
+    /// Scenes that could not be evaluated, or not along all of their paths.
+    pub(crate) failures: Vec<Failure>,
     /// What the figures cannot tell, and what to do about it.
     pub(crate) advice: Vec<Advice>,
 }
@@ -23,11 +26,29 @@ pub(crate) struct Results {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct RunInfo {
     pub(crate) dapple_version: String,
+    /// Hash of the program's file, 16 hexadecimal digits.
+    pub(crate) program: String,
     pub(crate) commit: Option<String>,
     pub(crate) command: String,
 }
 
+/// What metrics depend on beside the pictures.
 #[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct JudgeInfo {
+    /// Of the observer of FLIP.
+    pub(crate) pixels_per_degree: f32,
+    /// Hash of the weights of LPIPS; absent without.
+    pub(crate) lpips_weights: Option<String>,
+}
+
+/// What could not be evaluated, and why.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Failure {
+    pub(crate) scene: String,
+    pub(crate) error: String,
+}
+
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Machine {
     pub(crate) cpu: String,
     pub(crate) threads: usize,
@@ -40,6 +61,8 @@ pub(crate) struct Case {
     /// Unique within the results.
     pub(crate) name: String,
     pub(crate) scene: SceneInfo,
+    /// Of the file, that is played; absent where it has none.
+    pub(crate) animation: Option<String>,
     pub(crate) path: String,
     /// Length of the path that is played.
     pub(crate) seconds: f64,
@@ -105,7 +128,7 @@ pub(crate) struct Row {
     pub(crate) flip: Figure,
     pub(crate) hdr_flip: Option<Figure>,
     pub(crate) lpips: Option<Figure>,
-    /// Root mean square change, in 1/255 of visibility, of still places from one picture to the next at 60 Hz.
+    /// Root mean square change, in 1/255 of visibility, of places at rest from one client frame to the next at 60 Hz.
     pub(crate) flicker: Option<Figure>,
     pub(crate) kbit_per_s: Option<Figure>,
     pub(crate) snapshot_bytes: Option<u64>,
@@ -123,9 +146,10 @@ pub(crate) struct Row {
     pub(crate) times: Times,
 }
 
-/// Wall times, which differ from run to run.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+/// Wall times, which differ from run to run, and where they were taken: a run may continue on another machine.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Times {
+    pub(crate) machine: Machine,
     /// Mean of a server step.
     pub(crate) server_ms: Option<f64>,
     /// Mean of reconstruction and of applying an update.
@@ -141,7 +165,9 @@ pub(crate) struct Settling {
     pub(crate) visibility_psnr_db: Vec<Option<f64>>,
     /// Root mean square difference of visibility to what is shown in the end, 0 … 1.
     pub(crate) behind_rms: Vec<f64>,
-    /// Seconds until no more than a twentieth of the squared difference is left; absent where nothing changed in view.
+    /// Whether points still waited for rays when watching ended, so that what is shown there is not the end.
+    pub(crate) unfinished: bool,
+    /// Seconds until no more than a twentieth of the squared difference is left; absent where nothing changed in view, or unfinished.
     pub(crate) settled_s: Option<f64>,
 }
 
@@ -236,13 +262,19 @@ impl Machine {
     }
 }
 
-/// The commit the program runs from, where there is a repository around the current folder and git is installed.
+/// The commit that the program was built from, as far as can be told: where its file lies in a repository and git is installed, the
+/// present one, with "+changes" where files differ from it or the program is older than it.
 pub(crate) fn commit() -> Option<String> {
+    let program = std::env::current_exe().ok()?;
     let run = |args: &[&str]| {
-        let output = std::process::Command::new("git").args(args).output().ok()?;
+        let output =
+            std::process::Command::new("git").arg("-C").arg(program.parent()?).args(args).output().ok()?;
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
     };
     let commit = run(&["rev-parse", "--short=12", "HEAD"])?;
-    let clean = run(&["status", "--porcelain"]).is_some_and(|s| s.is_empty());
-    Some(if clean { commit } else { format!("{commit}+changes") })
+    let clean = run(&["status", "--porcelain", ":/"]).is_some_and(|s| s.is_empty());
+    let committed = run(&["log", "-1", "--format=%ct"]).and_then(|s| s.parse::<u64>().ok())?;
+    let built = std::fs::metadata(&program).ok()?.modified().ok()?;
+    let built = built.duration_since(std::time::UNIX_EPOCH).ok()?.as_secs();
+    Some(if clean && built >= committed { commit } else { format!("{commit}+changes") })
 }

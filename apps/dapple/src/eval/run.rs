@@ -1,5 +1,6 @@
 //! Runs a plan: scene by scene, path by path, job by job. What was done before is taken from the journal.
 
+use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
@@ -12,7 +13,9 @@ use super::job::{Desk, Job, Outcome, jobs};
 use super::journal::Journal;
 use super::pair::{Start, Starts};
 use super::plan::{Entry, Plan};
-use super::results::{Advice, Case, Machine, Results, RunInfo, SCHEMA, SceneInfo, Truth, TruthFrame, commit};
+use super::results::{
+    Advice, Case, Failure, JudgeInfo, Machine, Results, RunInfo, SCHEMA, SceneInfo, Truth, TruthFrame, commit,
+};
 use super::stage::Stage;
 use super::truth::Cache;
 use super::work::Work;
@@ -26,6 +29,8 @@ use crate::source::{self, Loaded, read_limited};
 struct Run<'a> {
     out: &'a Path,
     journal: Journal,
+    /// Keeps other evaluations out of the folder while it is open.
+    lock: Option<File>,
     cache: Cache,
     judge: Judge,
     record: Option<&'a Path>,
@@ -46,6 +51,7 @@ pub(super) fn evaluate(plan: &Plan, args: &EvalArgs) -> Result<Results> {
     let truth = args.truth_cache.clone().unwrap_or_else(|| args.out.join("truth"));
     let mut run = Run {
         out: &args.out,
+        lock: if args.out.is_dir() { lock(&args.out)? } else { None },
         journal: Journal::open(&args.out, args.fresh)?,
         cache: Cache::new(&truth),
         judge,
@@ -54,31 +60,64 @@ pub(super) fn evaluate(plan: &Plan, args: &EvalArgs) -> Result<Results> {
         reused: 0,
         work: Work::new(),
     };
-    let mut cases: Vec<Case> = Vec::new();
-    for entry in &plan.entries {
-        run.entry(entry, plan, &mut cases).with_context(|| entry.name.clone())?;
+    let mut results = run.empty_results(plan);
+    for (number, entry) in plan.entries.iter().enumerate() {
+        let outcome = run.entry(entry, plan, &mut results.cases).with_context(|| entry.name.clone());
+        match outcome {
+            Ok(()) => {}
+            // Nothing to go on with.
+            Err(error) if plan.entries.len() == 1 => return Err(error),
+            Err(error) => {
+                tracing::error!("{error:#}");
+                let error = format!("{error:#}");
+                results.failures.push(Failure { scene: entry.name.clone(), error });
+            }
+        }
+        results.advice = advise(&results);
+        // Hours may still come: what is there can be read.
+        if number + 1 < plan.entries.len() && !results.cases.is_empty() {
+            super::write_tables(&results, run.out)?;
+        }
     }
-    let advice = cases.iter().enumerate().flat_map(|(index, case)| {
-        advice::of(case).into_iter().map(move |text| Advice { case: Some(index), text })
-    });
-    let advice = advice.collect();
     drop(run.work);
+    if results.cases.is_empty()
+        && let Some(first) = results.failures.first()
+    {
+        bail!("none of the {} scenes could be evaluated; the first: {}", plan.entries.len(), first.error);
+    }
     if run.reused > 0 {
         let jobs = if run.reused == 1 { "job" } else { "jobs" };
         say!("{} {jobs} done before, not run again (--fresh runs all)", run.reused);
     }
-    Ok(Results {
-        schema: SCHEMA,
-        title: plan.title.clone(),
-        run: RunInfo {
-            dapple_version: env!("CARGO_PKG_VERSION").to_owned(),
-            commit: commit(),
-            command: command_line(),
-        },
-        machine: Machine::here(),
-        cases,
-        advice,
-    })
+    Ok(results)
+}
+
+/// What readers of the figures should know: of all, then of each case.
+fn advise(results: &Results) -> Vec<Advice> {
+    let failed = results.failures.iter().map(|failure| Advice {
+        case: None,
+        text: format!("{} could not be evaluated: {}", failure.scene, failure.error),
+    });
+    let of_cases = results.cases.iter().enumerate().flat_map(|(index, case)| {
+        advice::of(case).into_iter().map(move |text| Advice { case: Some(index), text })
+    });
+    failed.chain(of_cases).collect()
+}
+
+/// Takes the folder for this process; where the file system has no locks, everyone can have it.
+fn lock(out: &Path) -> Result<Option<File>> {
+    let path = out.join("running.lock");
+    let file = File::create(&path).with_context(|| format!("cannot write {}", path.display()))?;
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(TryLockError::WouldBlock) => {
+            bail!("another evaluation is writing into {}: wait for it, or give another --out", out.display())
+        }
+        Err(TryLockError::Error(error)) => {
+            tracing::debug!("no lock on {}: {error}", path.display());
+            Ok(None)
+        }
+    }
 }
 
 /// The command that runs, to be pasted.
@@ -96,6 +135,27 @@ fn quoted(argument: &str) -> String {
 }
 
 impl Run<'_> {
+    fn empty_results(&self, plan: &Plan) -> Results {
+        Results {
+            schema: SCHEMA,
+            title: plan.title.clone(),
+            run: RunInfo {
+                dapple_version: env!("CARGO_PKG_VERSION").to_owned(),
+                program: self.journal.program().to_owned(),
+                commit: commit(),
+                command: command_line(),
+            },
+            machine: Machine::here(),
+            judge: JudgeInfo {
+                pixels_per_degree: self.judge.pixels_per_degree,
+                lpips_weights: self.judge.weights.clone(),
+            },
+            cases: Vec::new(),
+            failures: Vec::new(),
+            advice: Vec::new(),
+        }
+    }
+
     /// All cases of one scene.
     fn entry(&mut self, entry: &Entry, plan: &Plan, cases: &mut Vec<Case>) -> Result<()> {
         self.work.message(&format!("loading {}", entry.name));
@@ -103,6 +163,9 @@ impl Run<'_> {
         // Only now, so that a scene that cannot be used leaves nothing behind.
         std::fs::create_dir_all(self.out)
             .with_context(|| format!("cannot create the folder {}", self.out.display()))?;
+        if self.lock.is_none() {
+            self.lock = lock(self.out)?;
+        }
         let radius = source::radius_of(&loaded.scene, entry.settings.radius)?;
         let mut starts = Starts::new(&loaded.scene);
         let paths = paths(&loaded, &entry.settings.paths)?;
@@ -155,6 +218,7 @@ impl Run<'_> {
                 instances: scene.instances.len() as u64,
                 warnings: scene.warnings.iter().map(|w| w.message.clone()).collect(),
             },
+            animation: scene.active_animation.map(|i| scene.animations[i as usize].name.clone()),
             path: stage.path.name.clone(),
             seconds: stage.seconds,
             width: stage.settings.size.width,

@@ -1,4 +1,5 @@
-//! How the error falls after everything moved at once: the scene jumps to the middle of its path and stands still there.
+//! How the error falls after everything moved at once: the scene stands still at its start, then jumps to the middle of its path and
+//! stands still there.
 
 use anyhow::Result;
 use dapple_client::Reconstruction;
@@ -13,6 +14,8 @@ use crate::picture::Shown;
 
 /// Longest time after the move that is watched, seconds; at least three server steps.
 const WATCHED_S: f64 = 1.0;
+/// Most server steps that a scene standing at its start gets before the jump, so that nothing of the path is left.
+const MAX_STEPS_BEFORE: u32 = 256;
 /// The light has settled where this part of the squared difference to what it becomes is left.
 const SETTLED: f64 = 0.05;
 
@@ -26,17 +29,25 @@ pub(super) fn settle(
 ) -> Result<Vec<Settling>> {
     let moved_s = (0.5 * stage.whole_s * CLIENT_HZ).floor() / CLIENT_HZ;
     let frame = stage.middle(moved_s, cache)?;
+    for _ in 0..MAX_STEPS_BEFORE {
+        let step = pair.step_at(0.0, stage)?;
+        if !step.changed && step.backlog == 0 {
+            break;
+        }
+    }
     let watched_s = WATCHED_S.max(3.0 / pair.hz);
     let frames = (watched_s * CLIENT_HZ).ceil() as u32;
     let mut shown: Vec<Vec<Look>> = looks.iter().map(|_| Vec::new()).collect();
     let mut after_s = Vec::new();
-    let mut steps = 0;
+    let (mut steps, mut backlog) = (0, 0);
     for number in 0..=frames {
         let now_s = f64::from(number) / CLIENT_HZ;
         let mut changed = number == 0;
         while f64::from(steps + 1) / pair.hz <= now_s + 1e-9 {
             steps += 1;
-            changed |= pair.step_at(moved_s, stage)?;
+            let step = pair.step_at(moved_s, stage)?;
+            changed |= step.changed;
+            backlog = step.backlog;
         }
         after_s.push(now_s);
         for (look, shown) in looks.iter().zip(&mut shown) {
@@ -45,7 +56,7 @@ pub(super) fn settle(
             }
         }
     }
-    Ok(shown.iter().map(|looks| settling(looks, &frame, &after_s)).collect())
+    Ok(shown.iter().map(|looks| settling(looks, &frame, &after_s, backlog > 0)).collect())
 }
 
 /// What is shown from one client frame on.
@@ -68,7 +79,7 @@ impl Look {
     }
 }
 
-fn settling(looks: &[Look], frame: &Frame, after_s: &[f64]) -> Settling {
+fn settling(looks: &[Look], frame: &Frame, after_s: &[f64], unfinished: bool) -> Settling {
     let difference = |look: &Look| match looks.last() {
         Some(last) => mean_square(&look.visibility, &last.visibility, frame.truth.covered()),
         None => 0.0,
@@ -82,9 +93,10 @@ fn settling(looks: &[Look], frame: &Frame, after_s: &[f64]) -> Settling {
         after_s: after_s.to_vec(),
         visibility_psnr_db: (0..after_s.len()).map(|n| looks.get(at(n)).and_then(|l| l.psnr_db)).collect(),
         behind_rms: (0..after_s.len()).map(|n| behind.get(at(n)).map_or(0.0, |b| b.sqrt())).collect(),
+        unfinished,
         settled_s: looks
             .get(settled)
-            .filter(|_| first > 0.0)
+            .filter(|_| first > 0.0 && !unfinished)
             .and_then(|look| after_s.get(look.since))
             .copied(),
     }

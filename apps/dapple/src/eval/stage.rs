@@ -5,8 +5,6 @@ use std::rc::Rc;
 
 use anyhow::Result;
 use dapple_client::{Drawn, PictureParams, draw};
-use dapple_render::gbuffer::rasterize;
-use dapple_render::shade::Shaded;
 use dapple_scene::{CameraPath, Scene};
 use dapple_trace::Tracer;
 
@@ -18,8 +16,14 @@ use crate::source::Loaded;
 
 /// Pictures are kept while they fit into so many bytes, and drawn again where they do not.
 const MAX_KEPT_BYTES: usize = 3 << 29;
-/// About what a sample takes: what it shows, now and a moment later, its light, and the truth.
-const BYTES_A_SAMPLE: usize = 100;
+/// About what a sample takes: what it shows, its light, and the truth.
+const BYTES_A_SAMPLE: usize = 80;
+/// Most client frames after a picture in which flicker is watched: a step of a server at 5 Hz. Of slower ones only some steps
+/// are seen, which is as often as they flicker.
+const MAX_WATCHED: u32 = 12;
+/// Part of a piece by which a picture lies further in its piece of the path than the one before lies in its own: the golden
+/// ratio, whose multiples spread evenly over any period, that of server steps among them.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// One picture of the path.
 pub(super) struct Frame {
@@ -28,15 +32,9 @@ pub(super) struct Frame {
     pub(super) truth: Shown,
     /// Of the truth's visibility, over pixels.
     pub(super) noise_mse: f64,
-    pub(super) next: Next,
-}
-
-/// What the viewer sees one client frame later.
-pub(super) struct Next {
-    pub(super) time_s: f64,
-    /// Without light: only visibility is compared.
-    pub(super) drawn: Drawn,
-    /// Where the pixels of before are now.
+    /// Client frames from here on in which flicker is watched: before the next picture, and about a server step long.
+    pub(super) watched_s: Vec<f64>,
+    /// What stands still in all of them.
     pub(super) still: StillMap,
 }
 
@@ -133,7 +131,9 @@ impl<'a> Stage<'a> {
         if let Some(frame) = &self.frames.borrow()[index] {
             return Ok(frame.clone());
         }
-        let frame = Rc::new(self.make(self.frame_times_s[index], cache, progress)?);
+        let time_s = self.frame_times_s[index];
+        let until_s = self.frame_times_s.get(index + 1).copied().unwrap_or(self.seconds);
+        let frame = Rc::new(self.make(time_s, &self.watched(time_s, until_s), cache, progress)?);
         let bytes = (self.samples() as usize).saturating_mul(BYTES_A_SAMPLE);
         if bytes.saturating_mul(self.frame_times_s.len()) <= MAX_KEPT_BYTES {
             self.frames.borrow_mut()[index] = Some(frame.clone());
@@ -146,15 +146,29 @@ impl<'a> Stage<'a> {
         if let Some(frame) = self.middle.borrow().as_ref().filter(|frame| frame.time_s == time_s) {
             return Ok(frame.clone());
         }
-        let frame = Rc::new(self.make(time_s, cache, &|_| ())?);
+        let frame = Rc::new(self.make(time_s, &[], cache, &|_| ())?);
         *self.middle.borrow_mut() = Some(frame.clone());
         Ok(frame)
     }
 
-    fn make(&self, time_s: f64, cache: &Cache, progress: &(dyn Fn(f64) + Sync)) -> Result<Frame> {
+    /// Client frames after a picture in which flicker is watched, the last one not after `until_s`.
+    fn watched(&self, time_s: f64, until_s: f64) -> Vec<f64> {
+        let slowest_hz = self.settings.hz.iter().copied().fold(CLIENT_HZ, f64::min);
+        let step = ((CLIENT_HZ / slowest_hz).ceil() as u32).min(MAX_WATCHED);
+        let left = ((until_s - time_s) * CLIENT_HZ + 1e-6) as u32;
+        (1..=step.min(left)).map(|k| time_s + f64::from(k) / CLIENT_HZ).collect()
+    }
+
+    fn make(
+        &self,
+        time_s: f64,
+        watched_s: &[f64],
+        cache: &Cache,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Result<Frame> {
         let scene = self.scene();
-        let camera = |time_s: f64| self.path.camera(scene, &scene.pose_undeformed(time_s));
-        let drawn = draw(scene, &camera(time_s), time_s, &self.params)?;
+        let camera = self.path.camera(scene, &scene.pose_undeformed(time_s));
+        let drawn = draw(scene, &camera, time_s, &self.params)?;
         let request = Request {
             scene,
             drawn: &drawn,
@@ -164,15 +178,8 @@ impl<'a> Stage<'a> {
         };
         let traced = cache.get(&request, || self.tracer_at(&drawn), progress)?;
         let truth = Shown::new(&drawn, Some(&traced.visibility))?;
-        let next_s = time_s + 1.0 / CLIENT_HZ;
-        let next_camera = camera(next_s);
-        let pose = scene.pose(next_s);
-        let (width, height) = (self.params.width, self.params.height);
-        let gbuffer = rasterize(scene, &pose, &next_camera, width, height, self.params.supersample)?;
-        let next_drawn = Drawn { pose, gbuffer, shaded: Shaded { direct: Vec::new(), ambient: Vec::new() } };
-        let still = still_map(scene, &drawn, &next_drawn, &next_camera, &self.moving, self.radius_m);
-        let next = Next { time_s: next_s, drawn: next_drawn, still };
-        Ok(Frame { time_s, drawn, truth, noise_mse: traced.noise_mse, next })
+        let still = still_map(scene, &drawn, watched_s, &self.moving, self.radius_m);
+        Ok(Frame { time_s, drawn, truth, noise_mse: traced.noise_mse, watched_s: watched_s.to_vec(), still })
     }
 
     /// The scene's tracer in a picture's pose.
@@ -192,12 +199,15 @@ fn path_seconds(scene: &Scene, path: &CameraPath) -> f64 {
     [path.duration_s(), animated, 10.0].into_iter().find(|s| *s > 0.0).unwrap_or(10.0)
 }
 
-/// Times in the middle of `frames` equal pieces, on the client's frame grid; fewer where pieces are shorter than its steps.
+/// One time in each of `frames` equal pieces, on the client's frame grid; fewer where pieces are shorter than its steps.
+/// The first is in the middle of its piece. Each next one lies a golden part further in its own: were all in the middle, a path
+/// whose pieces last a whole number of server steps would be seen at one lag after a step alone.
 fn frame_times(frames: u32, seconds: f64) -> Vec<f64> {
     let mut times: Vec<f64> = (0..frames)
         .map(|i| {
-            let middle = (f64::from(i) + 0.5) / f64::from(frames) * seconds;
-            (middle * CLIENT_HZ).floor() / CLIENT_HZ
+            let i = f64::from(i);
+            let at = (i + (0.5 + i * GOLDEN) % 1.0) / f64::from(frames) * seconds;
+            (at * CLIENT_HZ).floor() / CLIENT_HZ
         })
         .collect();
     times.dedup();
@@ -209,16 +219,39 @@ mod tests {
     use super::*;
 
     #[test]
-    fn frames_lie_on_the_grid_inside_the_path() {
-        let times = frame_times(4, 15.0);
-        assert_eq!(
-            times,
-            [1.866_666_666_666_666_7, 5.616_666_666_666_666, 9.366_666_666_666_667, 13.116_666_666_666_667]
-        );
-        for n in [1, 3, 900] {
+    fn frames_lie_on_the_grid_inside_their_pieces() {
+        for n in [1u32, 2, 3, 4, 30, 900] {
             let times = frame_times(n, 15.0);
-            assert!(times.windows(2).all(|w| w[0] < w[1]) && times[times.len() - 1] < 15.0, "{n}");
+            assert!(times.windows(2).all(|w| w[0] < w[1]), "{n}");
+            let piece_s = 15.0 / f64::from(n);
+            for (i, time_s) in times.iter().enumerate() {
+                let steps = time_s * CLIENT_HZ;
+                assert!((steps - steps.round()).abs() < 1e-9, "{n}: {time_s}");
+                let start_s = i as f64 * piece_s;
+                // The grid takes up to a step off.
+                assert!(
+                    (start_s - 1.0 / CLIENT_HZ..start_s + piece_s).contains(time_s),
+                    "{n}: {i}: {time_s}"
+                );
+            }
         }
-        assert_eq!(frame_times(60, 0.1).len(), 6, "no picture twice");
+        assert_eq!(frame_times(1, 15.0), [7.5]);
+        let crowded = frame_times(60, 0.1);
+        assert!(
+            crowded.len() <= 6 && crowded.windows(2).all(|w| w[0] < w[1]),
+            "no picture twice: {crowded:?}"
+        );
+    }
+
+    #[test]
+    fn pictures_see_every_lag_after_a_server_step() {
+        for (frames, hz) in [(8, 15.0), (30, 15.0), (60, 30.0), (60, 5.0), (75, 5.0)] {
+            // Client frames since the last step.
+            let lags: std::collections::BTreeSet<u32> = frame_times(frames, 15.0)
+                .into_iter()
+                .map(|t| (t * CLIENT_HZ).round() as u32 % (CLIENT_HZ / hz) as u32)
+                .collect();
+            assert_eq!(lags.len(), (CLIENT_HZ / hz) as usize, "{frames} pictures at {hz} Hz: {lags:?}");
+        }
     }
 }

@@ -6,13 +6,15 @@ use anyhow::Result;
 use dapple_client::Drawn;
 use dapple_scene::Scene;
 use dapple_trace::Tracer;
-use dapple_trace::rtao::{RtaoParams, Site, trace_visibility_with_progress};
+use dapple_trace::rtao::{RtaoParams, Site, trace_visibility, trace_visibility_with_progress};
 
 use crate::picture::{sites, write_file};
 use crate::source::read_limited;
 
-/// Raised when the same rays would give something else.
+/// Raised when the file's contents mean something else.
 const VERSION: u32 = 1;
+/// Places of a file that are traced again when it is read: were the tracer or its directions others now, they would differ.
+const CHECKED: usize = 64;
 /// The largest file that is read back.
 const MAX_BYTES: u64 = 4 << 30;
 /// One pixel in so many is traced a second time, with other directions, to learn how noisy the truth is.
@@ -56,8 +58,8 @@ impl Cache {
         Cache { folder: folder.to_owned() }
     }
 
-    /// From its file, or traced (`tracer` gives the scene's tracer in the picture's pose) and kept. A file that cannot be used is
-    /// made anew.
+    /// From its file, or traced (`tracer` gives the scene's tracer in the picture's pose) and kept. A file that cannot be used, or
+    /// that this program would not make, is made anew.
     pub(super) fn get<'t>(
         &self,
         request: &Request<'_>,
@@ -67,11 +69,21 @@ impl Cache {
         let (indices, sites) = sites(request.scene, request.drawn);
         let again = second_opinion(request.drawn, &indices);
         let file = self.folder.join(format!("{}.truth", key(request, &sites)));
+        let tracer = tracer();
         let counts = read(&file, sites.len() + again.len(), request.rays);
+        let counts = counts.filter(|counts| {
+            let same = still_so(&tracer, &sites, counts, request);
+            if !same {
+                tracing::warn!(
+                    "{} was traced by another version of this program: traced anew",
+                    file.display()
+                );
+            }
+            same
+        });
         let counts = match counts {
             Some(counts) => counts,
             None => {
-                let tracer = tracer();
                 let again: Vec<Site> = again.iter().map(|&i| sites[i]).collect();
                 let total = (sites.len() + again.len()).max(1) as f64;
                 let mut visibility = vec![1.0; sites.len() + again.len()];
@@ -86,15 +98,27 @@ impl Cache {
                     second,
                     &|done| progress((sites.len() as f64 + done as f64) / total),
                 );
-                // Visibility is a whole number of rays out of all of them.
-                let counts: Vec<u32> =
-                    visibility.iter().map(|v| (v * request.rays as f32).round() as u32).collect();
+                let counts: Vec<u32> = visibility.iter().map(|v| count(*v, request.rays)).collect();
                 write_file(&file, &encode(&counts, request.rays)?)?;
                 counts
             }
         };
         Ok(assemble(request, &indices, &again, &counts))
     }
+}
+
+/// Whether some of the sites, traced again, give what the file says.
+fn still_so(tracer: &Tracer, sites: &[Site], counts: &[u32], request: &Request<'_>) -> bool {
+    let chosen: Vec<usize> = (0..sites.len()).step_by(sites.len().div_ceil(CHECKED).max(1)).collect();
+    let some: Vec<Site> = chosen.iter().map(|&i| sites[i]).collect();
+    let mut traced = vec![1.0; some.len()];
+    trace_visibility(tracer, &some, &request.params(STREAM), &mut traced);
+    chosen.iter().zip(traced).all(|(&i, visibility)| count(visibility, request.rays) == counts[i])
+}
+
+/// Visibility is a whole number of rays out of all of them.
+fn count(visibility: f32, rays: u32) -> u32 {
+    (visibility * rays as f32).round() as u32
 }
 
 /// Indices into the sites of one pixel in sixteen, along diagonals so that every column and row has some.
@@ -211,5 +235,38 @@ mod tests {
             std::fs::write(&file, &flipped).unwrap();
             assert_eq!(read(&file, counts.len(), rays), None);
         }
+    }
+
+    #[test]
+    fn truth_that_this_program_would_not_trace_is_traced_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let glb = dapple_scene::builtin::glb("atrium", 0.02).unwrap();
+        let scene = dapple_scene::load("atrium.glb", &glb, &dapple_scene::NoFiles).unwrap();
+        let pose = scene.pose(1.0);
+        let params =
+            dapple_client::PictureParams { width: 24, height: 16, supersample: 1, shade: Default::default() };
+        let camera = scene.camera_paths()[0].camera(&scene, &pose);
+        let drawn = dapple_client::draw(&scene, &camera, 1.0, &params).unwrap();
+        let request = Request { scene: &scene, drawn: &drawn, rays: 32, radius_m: 0.6, seed: 1 };
+        let cache = Cache::new(folder.path());
+        let tracer = std::cell::RefCell::new(Tracer::new(&scene, &drawn.pose));
+        let parts = std::sync::atomic::AtomicUsize::new(0);
+        let get = || {
+            let traced = cache
+                .get(&request, || tracer.borrow(), &|_| {
+                    parts.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+                })
+                .unwrap();
+            (traced, parts.swap(0, std::sync::atomic::Ordering::Relaxed) > 0)
+        };
+        let (truth, traced) = get();
+        assert!(traced);
+        assert_eq!(get(), (truth.clone(), false), "from its file");
+        // A whole file, of a tracer that sees everything open.
+        let file = std::fs::read_dir(folder.path()).unwrap().next().unwrap().unwrap().path();
+        let bytes = std::fs::read(&file).unwrap();
+        let count = u64::from_le_bytes(bytes[8..16].try_into().unwrap()) as usize;
+        std::fs::write(&file, encode(&vec![32; count], 32).unwrap()).unwrap();
+        assert_eq!(get(), (truth, true));
     }
 }

@@ -35,20 +35,28 @@ impl Settings {
     /// `small` is the built-in setting, which takes less than a minute.
     pub(super) fn new(options: &Options, small: bool) -> Result<Settings> {
         let options = options.clone();
-        let default_methods =
-            vec![Method::Psao, Method::PsaoHat { radius: 1.0 }, Method::Rtao { rays: 16 }, Method::None];
+        let supersample = options.supersample.unwrap_or(2);
+        // Zero is refused below.
+        let samples = supersample.saturating_mul(supersample).max(1);
+        let whole = |rays: u32| rays.checked_next_multiple_of(samples).unwrap_or(rays);
+        let default_methods = vec![
+            Method::Psao,
+            Method::PsaoHat { radius: 1.0 },
+            Method::Rtao { rays: whole(16) },
+            Method::None,
+        ];
         let settings = Settings {
             methods: distinct(options.methods.unwrap_or(default_methods)),
             paths: distinct(options.path.unwrap_or_default()),
             seconds: options.seconds.or(small.then_some(2.0)),
             frames: options.frames.unwrap_or(if small { 2 } else { 4 }),
             size: options.size.unwrap_or(Size { width: 480, height: 270 }),
-            supersample: options.supersample.unwrap_or(2),
+            supersample,
             points_per_m2: distinct(
                 options.points.unwrap_or_else(|| vec![if small { 256.0 } else { 512.0 }]),
             ),
             hz: distinct(options.hz.unwrap_or_else(|| vec![15.0])),
-            reference_rays: options.reference_rays.unwrap_or(if small { 128 } else { 512 }),
+            reference_rays: options.reference_rays.unwrap_or(whole(if small { 128 } else { 512 })),
             radius: options.radius.unwrap_or(Radius::Metres(0.6)),
             point_rays: options.point_rays.unwrap_or(64),
             threshold: options.threshold.unwrap_or(4),
@@ -76,6 +84,23 @@ impl Settings {
         if !(1..=65536).contains(&self.reference_rays) {
             bail!("--reference-rays is {}, must be 1 to 65536", self.reference_rays);
         }
+        let samples = self.supersample * self.supersample;
+        let of_methods = self.methods.iter().filter_map(|method| match method {
+            Method::Rtao { rays } => Some((format!("--methods has {method}"), *rays)),
+            _ => None,
+        });
+        let of_truth = (format!("--reference-rays is {}", self.reference_rays), self.reference_rays);
+        // Rounding in silence would give a method other rays than its name says.
+        for (what, rays) in of_methods.chain([of_truth]) {
+            if !rays.is_multiple_of(samples) {
+                let near = (rays / samples * samples).max(samples);
+                bail!(
+                    "{what}: with --supersample {} a pixel has {samples} samples, each with as many rays, so rays a \
+                     pixel must be a multiple of {samples}: {near}, for example",
+                    self.supersample
+                );
+            }
+        }
         if let Some(bad) = self.hz.iter().find(|h| !(h.is_finite() && **h > 0.0 && **h <= 1000.0)) {
             bail!("--hz has {bad}, must be above 0 to 1000");
         }
@@ -94,9 +119,9 @@ impl Settings {
         Ok(())
     }
 
-    /// Rays a sample so that a pixel gets at least `rays_per_pixel`.
+    /// Rays a sample so that a pixel gets `rays_per_pixel`.
     pub(in crate::eval) fn rays_per_sample(&self, rays_per_pixel: u32) -> u32 {
-        rays_per_pixel.div_ceil(self.supersample * self.supersample)
+        rays_per_pixel / (self.supersample * self.supersample)
     }
 }
 
@@ -108,4 +133,31 @@ fn distinct<T: PartialEq>(list: Vec<T>) -> Vec<T> {
         }
         kept
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_a_pixel_are_shared_evenly_by_its_samples() {
+        let with = |supersample, methods, reference_rays| Options {
+            supersample: Some(supersample),
+            methods,
+            reference_rays,
+            ..Options::default()
+        };
+        for (options, says) in [
+            (with(2, Some(vec![Method::Rtao { rays: 6 }]), None), "rtao-6"),
+            (with(3, None, Some(512)), "504, for example"),
+            (with(2, None, Some(2)), "4, for example"),
+        ] {
+            let error = Settings::new(&options, false).unwrap_err().to_string();
+            assert!(error.contains(says), "{error}");
+        }
+        // Defaults fit themselves.
+        let settings = Settings::new(&with(3, None, None), false).unwrap();
+        assert_eq!((settings.reference_rays, settings.rays_per_sample(513)), (513, 57));
+        assert!(settings.methods.contains(&Method::Rtao { rays: 18 }));
+    }
 }

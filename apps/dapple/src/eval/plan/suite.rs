@@ -67,7 +67,12 @@ fn plan(text: &str, folder: &Path, flags: &Options) -> Result<Plan> {
     let mut entries = Vec::new();
     for (number, mut table) in suite.cases.into_iter().enumerate() {
         let which = which(&mut table, folder).with_context(|| format!("[[case]] {}", number + 1))?;
-        let own = Options::deserialize(table).with_context(|| format!("[[case]] {}", number + 1))?;
+        let own = Options::deserialize(table).with_context(|| {
+            format!("[[case]] {}, which may have scene or builtin, and settings", number + 1)
+        })?;
+        if let (Which::File(path), Some(_)) = (&which, own.detail) {
+            bail!("[[case]] {}: detail is for built-in scenes; {} is a file", number + 1, path.display());
+        }
         let options = flags.clone().or(&own).or(&suite.defaults);
         entries.push(entry(which, &options, false).with_context(|| format!("[[case]] {}", number + 1))?);
     }
@@ -114,6 +119,24 @@ mod tests {
     }
 
     #[test]
+    fn one_of_a_list_needs_no_brackets() {
+        let text = "[[case]]\nbuiltin = \"atrium\"\nmethods = \"psao\"\npoints = 300\nhz = \"5,30\"\npath = \"all\"\n\
+                    [[case]]\nbuiltin = \"atrium\"\nmethods = \"psao, none\"\npoints = [100, 2e2]\nhz = [60.0]\n";
+        let plan = plan(text, Path::new(""), &Options::default()).unwrap();
+        let [one, two] = &plan.entries[..] else { panic!("{plan:?}") };
+        assert_eq!((&one.settings.points_per_m2[..], &one.settings.hz[..]), (&[300.0][..], &[5.0, 30.0][..]));
+        assert_eq!(
+            (&one.settings.methods[..], &one.settings.paths[..]),
+            (&[Method::Psao][..], &["all".to_owned()][..])
+        );
+        assert_eq!(two.settings.methods, [Method::Psao, Method::None]);
+        assert_eq!(
+            (&two.settings.points_per_m2[..], &two.settings.hz[..]),
+            (&[100.0, 200.0][..], &[60.0][..])
+        );
+    }
+
+    #[test]
     fn mistakes_are_named() {
         for (text, says) in [
             ("", "[[case]]"),
@@ -123,6 +146,8 @@ mod tests {
             ("[[case]]\nbuiltin = \"atrium\"\nmethods = [\"magic\"]\n", "magic"),
             ("[[case]]\nbuiltin = \"nowhere\"\n", "nowhere"),
             ("[[case]]\nbuiltin = \"atrium\"\nframes = 0\n", "frames"),
+            ("[[case]]\nscene = \"a.glb\"\ndetail = 0.5\n", "a.glb is a file"),
+            ("[[case]]\nbuiltin = \"atrium\"\nhz = [\"often\"]\n", "often"),
             ("[[case]\n", "TOML"),
         ] {
             let error = plan(text, Path::new(""), &Options::default()).unwrap_err();

@@ -15,7 +15,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 
-use super::{columns, results};
+use super::{advice, columns, figures, results};
 use crate::picture::write_file;
 use results::Results;
 use words::escape;

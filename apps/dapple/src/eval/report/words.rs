@@ -2,7 +2,9 @@
 
 use std::fmt::Write;
 
+use super::advice::errors;
 use super::columns::{self, Column, Kind, Setting, bits, bytes, number, rank};
+use super::figures::psnr_difference;
 use super::results::{Case, Figure, Results, Row};
 
 /// Text as HTML, in an attribute too.
@@ -42,7 +44,7 @@ struct Rival<'a> {
     same_bits: bool,
     /// Of the best over the rival; `None` if one of them is equal to the truth.
     gain_db: Option<f64>,
-    /// Whether the intervals of both keep apart.
+    /// Whether the pictures tell both apart.
     clear: bool,
 }
 
@@ -68,9 +70,10 @@ fn headline<'a>(case: &'a Case, settings: &'a [Setting]) -> Option<Headline<'a>>
     };
     let other = |other: &Row| streamed(other) && other.method != row.method;
     let rival = best_of(&|r| other(r) && same_bits(r)).or_else(|| best_of(&other)).map(|place| {
-        let gain_db = best.figure.value.zip(place.figure.value).map(|(a, b)| a - b);
-        let spread = best.figure.ci95.zip(place.figure.ci95).map_or(0.0, |(a, b)| a.hypot(b));
-        Rival { same_bits: same_bits(place.row), gain_db, clear: gain_db.is_none_or(|g| g > spread), place }
+        let gain = psnr_difference(&errors(case, row), &errors(case, place.row));
+        // Picture by picture: that some are harder than others is no doubt about the difference.
+        let clear = gain.value.is_none_or(|db| db > gain.ci95.unwrap_or(0.0));
+        Rival { same_bits: same_bits(place.row), gain_db: gain.value, clear, place }
     });
     let traced = best_of(&|r| !streamed(r) && r.method != "none" && r.method != row.method);
     let none = best_of(&|r| r.method == "none" && r.method != row.method);
@@ -130,7 +133,7 @@ fn lead_of_one(headline: &Headline) -> String {
             Some(gain) => {
                 let _ = write!(
                     text,
-                    "; {than} is {} dB below, less than the intervals tell apart",
+                    "; {than} is {} dB below, less than the pictures tell apart",
                     number(gain, 1)
                 );
             }
@@ -236,7 +239,7 @@ pub(super) fn headlines(results: &Results) -> String {
                 |(gain, clear)| {
                     let sign = if gain > 0.0 { "+" } else { "" };
                     let doubt =
-                        if clear { "" } else { " <i title=\"less than the intervals tell apart\">(?)</i>" };
+                        if clear { "" } else { " <i title=\"less than the pictures tell apart\">(?)</i>" };
                     format!("{sign}{}\u{a0}dB{doubt}", number(gain, 1))
                 },
             ),
@@ -396,6 +399,25 @@ fn cell(html: &mut String, column: &Column, figure: Option<Figure>, best: Option
     }
 }
 
+/// Whether times come from elsewhere.
+fn elsewhere(results: &Results) -> &'static str {
+    let mut rows = results.cases.iter().flat_map(|case| &case.rows);
+    match rows.any(|row| row.times.machine != results.machine) {
+        true => {
+            "; some times were taken on another machine or with other threads, before the run continued here"
+        }
+        false => "",
+    }
+}
+
+fn judge(results: &Results) -> String {
+    let flip = format!("FLIP at {} pixels a degree", number(f64::from(results.judge.pixels_per_degree), 1));
+    match &results.judge.lpips_weights {
+        None => flip,
+        Some(hash) => format!("{flip}; LPIPS (squeeze) with weights {hash}"),
+    }
+}
+
 /// Command, machine, scenes: what it takes to get these figures again.
 pub(super) fn made(results: &Results) -> String {
     let (run, machine) = (&results.run, &results.machine);
@@ -407,8 +429,9 @@ pub(super) fn made(results: &Results) -> String {
     let threads =
         if machine.threads == 1 { "1 thread".to_owned() } else { format!("{} threads", machine.threads) };
     for (name, value) in [
-        ("program", format!("dapple {}, commit {commit}", run.dapple_version)),
-        ("machine", format!("{}, {threads}, {}", machine.cpu, machine.os)),
+        ("program", format!("dapple {}, commit {commit}, file {}", run.dapple_version, run.program)),
+        ("machine", format!("{}, {threads}, {}{}", machine.cpu, machine.os, elsewhere(results))),
+        ("metrics", judge(results)),
     ] {
         let _ = writeln!(html, "<dt>{name}</dt><dd>{}</dd>", escape(&value));
     }
@@ -436,7 +459,13 @@ pub(super) fn made(results: &Results) -> String {
                 ),
             ),
             ("scene hash", scene.hash.clone()),
-            ("path", format!("{}, {} s", case.path, number(case.seconds, 2))),
+            (
+                "path",
+                match &case.animation {
+                    None => format!("{}, {} s", case.path, number(case.seconds, 2)),
+                    Some(name) => format!("{}, {} s of animation {name}", case.path, number(case.seconds, 2)),
+                },
+            ),
             (
                 "pictures",
                 format!(
