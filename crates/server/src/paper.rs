@@ -96,7 +96,8 @@ impl PaperServer {
         let counts = self.updater.step(&self.scene, &pose, &mut self.tracer, input).counts;
         let view = look.map(|look| extended_view(&look.camera, look.aspect, self.margin_degrees));
         let (changes, paper) = self.paper.step(&self.scene, &pose, &self.updater, view.as_ref());
-        let frame = self.publisher.publish(self.paper.table(), &changes, now_s).map_err(PublishError::from)?;
+        let frame =
+            self.publisher.publish(self.paper.table(), &changes, now_s).map_err(PublishError::from)?;
         Ok(PaperReport { frame, counts, paper })
     }
 

@@ -18,8 +18,10 @@ const HASH: [u8; 32] = [7; 32];
 
 fn empty() -> CellTable {
     let grid = |count| VirtualGrid { dims: [4, 5, 6], count, ..VirtualGrid::default() };
-    let grids =
-        vec![InstanceGrid { instance: 1, grid: grid(5) }, InstanceGrid { instance: 9, grid: grid(BUCKETS - 5) }];
+    let grids = vec![
+        InstanceGrid { instance: 1, grid: grid(5) },
+        InstanceGrid { instance: 9, grid: grid(BUCKETS - 5) },
+    ];
     CellTable::new(Arc::new(TableLayout::new(0.1, 0.2, grids).unwrap()))
 }
 
@@ -186,5 +188,10 @@ fn the_body_is_compressed_as_the_paper_says() {
     let (zstd, lz4) = (bytes(CellCodec::Zstd), bytes(CellCodec::Lz4));
     assert!(zstd.cells <= 60 && zstd.buckets == BUCKETS);
     let raw = 12 * 64 + zstd.cells as usize * 28;
-    assert!(zstd.bytes.len() < lz4.bytes.len() && lz4.bytes.len() < raw, "{} {} {raw}", zstd.bytes.len(), lz4.bytes.len());
+    assert!(
+        zstd.bytes.len() < lz4.bytes.len() && lz4.bytes.len() < raw,
+        "{} {} {raw}",
+        zstd.bytes.len(),
+        lz4.bytes.len()
+    );
 }

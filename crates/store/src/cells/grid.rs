@@ -19,7 +19,10 @@ pub struct VirtualGrid {
 
 /// The cells of a box cannot be numbered in 32 bits.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("a grid of {cells:.0} cells, at most {} can be numbered; use larger cells or a smaller box", u32::MAX)]
+#[error(
+    "a grid of {cells:.0} cells, at most {} can be numbered; use larger cells or a smaller box",
+    u32::MAX
+)]
 pub struct GridTooLarge {
     /// How many cells the box holds.
     pub cells: f64,

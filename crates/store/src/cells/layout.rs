@@ -169,7 +169,8 @@ mod tests {
 
     #[test]
     fn nonsense_is_refused() {
-        let bad = |spacing, edge, grids: &[InstanceGrid]| TableLayout::new(spacing, edge, grids.to_vec()).is_err();
+        let bad =
+            |spacing, edge, grids: &[InstanceGrid]| TableLayout::new(spacing, edge, grids.to_vec()).is_err();
         let good = grid(0, [1, 1, 1], 1);
         assert!(!bad(0.1, 0.1, &[good]));
         assert!(bad(0.0, 0.1, &[good]) && bad(0.1, f32::NAN, &[good]));

@@ -134,7 +134,8 @@ impl CellSubscriber {
             }
             FrameKind::Delta => {
                 let held = self.epoch();
-                let Some(state) = self.state.as_mut().filter(|s| s.epoch.checked_add(1) == Some(epoch)) else {
+                let Some(state) = self.state.as_mut().filter(|s| s.epoch.checked_add(1) == Some(epoch))
+                else {
                     return Err(CellError::Gap { found: epoch, held });
                 };
                 let body = unpack(codec, packed, raw_bytes as usize)?;

@@ -7,8 +7,8 @@
 mod tests;
 mod twin;
 
-use dapple_store::cells::{PackedPoint, VirtualGrid, buckets_for, pack_normal};
 pub use dapple_store::cells::{BUCKET_CELLS, CELL_POINTS, Overflow};
+use dapple_store::cells::{PackedPoint, VirtualGrid, buckets_for, pack_normal};
 use dapple_store::points::{Change, PointLayout};
 
 use super::Hat;

@@ -59,8 +59,8 @@ impl Near {
                 let opposed = p.normal_local.dot(fragment.normal_local) <= 0.0;
                 (opposed, p.position_local.distance_squared(fragment.position_local), p.visibility)
             });
-            let best = ranked
-                .min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.total_cmp(&b.2)));
+            let best =
+                ranked.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.total_cmp(&b.2)));
             if let Some((opposed, _, visibility)) = best
                 && (!opposed || reach == farthest)
             {
@@ -89,7 +89,8 @@ pub(super) fn visibility(
         let weight = kernel.weight(d, n, p.normal_local);
         if weight > 0.0 {
             (least, greatest) = (least.min(p.visibility), greatest.max(p.visibility));
-            near.weighed.push((Weighed { weight, tangent: [d.dot(tangent), d.dot(bitangent)] }, p.visibility));
+            near.weighed
+                .push((Weighed { weight, tangent: [d.dot(tangent), d.dot(bitangent)] }, p.visibility));
         }
     }
     let value = match Fit::new(near.weighed.iter().map(|&(p, _)| p)) {

@@ -35,8 +35,7 @@ fn cloud() -> Cloud {
     let origin = Vec3::new(-1.0, 0.5, -1.0);
     let mut grid = VirtualGrid::spanning(origin, Vec3::new(2.0, 0.5, 2.0) / EDGE).unwrap();
     grid.count = buckets_for(400, 2.0);
-    let layout =
-        TableLayout::new(SPACING, EDGE, vec![InstanceGrid { instance: INSTANCE, grid }]).unwrap();
+    let layout = TableLayout::new(SPACING, EDGE, vec![InstanceGrid { instance: INSTANCE, grid }]).unwrap();
     let grid = *layout.grid_of(INSTANCE).unwrap();
     let mut cloud = Cloud { table: CellTable::new(Arc::new(layout)), points: Vec::new() };
     let mut cells: Vec<([u32; 3], usize)> = Vec::new();
@@ -140,8 +139,7 @@ fn least_squares_sees_every_point_that_it_gives_weight() {
     let cloud = cloud();
     let fragments = fragments();
     let kernel = Kernel::MovingLeastSquares(MovingLeastSquares::default());
-    let found =
-        reconstruct(&cloud.table, &kernel, &fragments.iter().copied().map(Some).collect::<Vec<_>>());
+    let found = reconstruct(&cloud.table, &kernel, &fragments.iter().copied().map(Some).collect::<Vec<_>>());
     let mut fitted = 0;
     for (fragment, found) in fragments.iter().zip(found) {
         if let Some(expected) = fit_of_all(&cloud, fragment) {
@@ -160,7 +158,8 @@ fn where_nothing_has_weight_the_hat_is_open_and_least_squares_takes_the_nearest(
         position_local: Vec3::new(0.1, 1.0 + 2.5 * SPACING, 0.2),
         normal_local: Vec3::Y,
     };
-    let look = |kernel: &Kernel, fragment: LocalSurface| reconstruct(&cloud.table, kernel, &[Some(fragment), None]);
+    let look =
+        |kernel: &Kernel, fragment: LocalSurface| reconstruct(&cloud.table, kernel, &[Some(fragment), None]);
     let (hat, mls) = (Kernel::Hat(Hat::default()), Kernel::default());
     assert_eq!(look(&hat, above), [1.0, 1.0]);
     let nearest = cloud

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use dapple_store::cells::{
-    BucketEntry, CELL_POINTS, CellChanges, CellData, CellTable, HashBucket, Overflow, PackedPoint, TableLayout,
+    BucketEntry, CELL_POINTS, CellChanges, CellData, CellTable, HashBucket, Overflow, PackedPoint,
+    TableLayout,
 };
 
 /// A cell of some instance: the bucket that [Neff2023] eq. 1 gives, and the cell's number in its grid.

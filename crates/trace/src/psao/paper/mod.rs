@@ -192,13 +192,7 @@ impl PaperUpdater {
     }
 
     /// Every point that changed by more than a threshold, in order.
-    fn find(
-        &self,
-        scene: &Scene,
-        pose: &Pose,
-        updater: &Updater,
-        view: Option<&ConvexVolume>,
-    ) -> Vec<Found> {
+    fn find(&self, scene: &Scene, pose: &Pose, updater: &Updater, view: Option<&ConvexVolume>) -> Vec<Found> {
         let (anchors, visibility) = (updater.anchors(), updater.store().visibility());
         let edge_m = self.memory.table().layout().edge_m();
         let least_cosine = libm::cosf(self.params.normal_degrees.to_radians());

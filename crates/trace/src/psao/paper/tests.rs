@@ -222,7 +222,8 @@ fn what_bends_is_sent_even_if_its_visibility_stays() {
     let layout = paper.table().layout();
     for set in running.paper.sets.iter().filter(|set| set.bends) {
         for point in set.first..set.first + set.len {
-            let posed = running.updater.anchors()[point as usize].pose_local(&running.scene, &bent, 2).unwrap();
+            let posed =
+                running.updater.anchors()[point as usize].pose_local(&running.scene, &bent, 2).unwrap();
             let sent = paper.sent[point as usize];
             let corner = Vec3::from_array(sent.cell.map(|c| c as f32));
             let place = set.grid.origin + (corner + sent.point.position_in_cell()) * layout.edge_m();
@@ -256,9 +257,8 @@ fn without_thresholds_the_table_is_the_one_made_anew() {
 fn what_is_out_of_view_waits_until_it_comes_into_view() {
     let (scene, mut pose) = stage();
     let mut running = Running::new(scene, &pose, PaperParams::default());
-    let look_at = |target| {
-        extended_view(&PosedCamera::look_at(Vec3::new(2.0, 1.0, 6.0), target, 0.8), 1.0, 20.0)
-    };
+    let look_at =
+        |target| extended_view(&PosedCamera::look_at(Vec3::new(2.0, 1.0, 6.0), target, 0.8), 1.0, 20.0);
     place_cube(&mut pose, 2.5);
     let away = look_at(Vec3::new(2.0, 1.0, 9.0));
     let (changes, counts) = running.step(&pose, Some(&away));

@@ -48,7 +48,9 @@ mod tests {
                 10.0 * Vec3::new(tangent(x), tangent(y), -1.0)
             };
             for sign in [-1.0, 1.0] {
-                assert!(view.contains(at(0.0, sign * (up - 0.3))) && view.contains(at(sign * (aside - 0.3), 0.0)));
+                assert!(
+                    view.contains(at(0.0, sign * (up - 0.3))) && view.contains(at(sign * (aside - 0.3), 0.0))
+                );
                 assert!(!view.contains(at(0.0, sign * (up + 0.3))), "{margin}");
                 assert!(!view.contains(at(sign * (aside + 0.3), 0.0)), "{margin}");
             }
