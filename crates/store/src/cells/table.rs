@@ -25,7 +25,7 @@ pub struct HashBucket(pub [BucketEntry; BUCKET_CELLS]);
 impl HashBucket {
     /// Whether it has no cells.
     pub fn is_empty(&self) -> bool {
-        self.0[0] == BucketEntry::FREE
+        self.0.iter().all(|entry| *entry == BucketEntry::FREE)
     }
 }
 
@@ -135,6 +135,8 @@ impl CellTable {
         let entries = self.buckets.iter().flat_map(|b| &b.0).filter(|entry| entry.cell != 0);
         let mut cells: Vec<u32> = entries.map(|entry| entry.cell - 1).collect();
         cells.sort_unstable();
+        // What came from outside may name a cell twice.
+        cells.dedup();
         CellChanges { buckets, cells }
     }
 

@@ -112,12 +112,16 @@ impl CellSubscriber {
             return Err(bad("the time is not finite").into());
         }
         let raw_bytes = reader.varint(PART)?;
+        let packed = reader.take(reader.len(), PART)?;
+        let (epoch, held) = (header.epoch, self.epoch());
+        let follows = held.and_then(|held| held.checked_add(1)) == Some(epoch);
+        if header.kind == FrameKind::Delta && !follows {
+            return Err(CellError::Gap { found: epoch, held });
+        }
         let limit = self.most_bytes(header.kind) as u64;
         if raw_bytes > limit {
             return Err(DecodeError::TooLarge { what: "bytes of cells", value: raw_bytes, limit }.into());
         }
-        let packed = reader.take(reader.len(), PART)?;
-        let epoch = header.epoch;
         match header.kind {
             FrameKind::Snapshot => {
                 let body = unpack(codec, packed, raw_bytes as usize)?;
@@ -133,9 +137,7 @@ impl CellSubscriber {
                 Ok(changes)
             }
             FrameKind::Delta => {
-                let held = self.epoch();
-                let Some(state) = self.state.as_mut().filter(|s| s.epoch.checked_add(1) == Some(epoch))
-                else {
+                let Some(state) = self.state.as_mut() else {
                     return Err(CellError::Gap { found: epoch, held });
                 };
                 let body = unpack(codec, packed, raw_bytes as usize)?;
