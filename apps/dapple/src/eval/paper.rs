@@ -25,7 +25,7 @@ pub(super) enum AnyServer {
 /// The receiving end.
 pub(super) enum AnyClient {
     Own(Box<Client>),
-    Paper(PaperClient),
+    Paper(Box<PaperClient>),
 }
 
 /// What a step sent, and what it did.
@@ -109,7 +109,7 @@ impl AnyClient {
         let scene = server.scene().clone();
         match server {
             AnyServer::Own(_) => AnyClient::Own(Box::new(Client::new(scene, Limits::default()))),
-            AnyServer::Paper(_) => AnyClient::Paper(PaperClient::new(scene, CellLimits::default())),
+            AnyServer::Paper(_) => AnyClient::Paper(Box::new(PaperClient::new(scene, CellLimits::default()))),
         }
     }
 
