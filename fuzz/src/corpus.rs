@@ -3,7 +3,9 @@
 
 mod scenes;
 
+use dapple_store::cells::CellChanges;
 use dapple_store::points::{Change, PointStore};
+use dapple_stream::cells::{CellCodec, CellPublisher};
 use dapple_stream::{
     Frame, FrameHeader, FrameKind, Limits, Publisher, PublisherConfig, Recorder, RecordingHeader,
 };
@@ -62,6 +64,8 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
     let mut empty = Publisher::new([0; 32], PublisherConfig::default());
     frame("empty", &publish(&mut empty, &Input(&[]).store()));
 
+    cells(&mut seeds);
+
     // Soups of any numbers, of small ones and of very few different ones; mutations do the rest.
     for (coarse, name) in ["any-bits", "small", "few"].into_iter().enumerate() {
         let mut random = Random(coarse as u64);
@@ -113,6 +117,42 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
     seeds.push(("read_weights", "table".to_owned(), crate::weights::table().into_bytes()));
     seeds.extend(scenes.map(|(name, bytes)| ("load_scene", name.to_owned(), bytes)));
     seeds
+}
+
+/// Frames, payloads and a body of the paper's cells.
+fn cells(seeds: &mut Vec<(&'static str, String, Vec<u8>)>) {
+    let table = crate::cells::sample();
+    let changes = CellChanges { buckets: vec![1, 4], cells: vec![0, 3] };
+    for (codec, name) in [(CellCodec::Zstd, "zstd"), (CellCodec::Lz4, "lz4")] {
+        let mut publisher = CellPublisher::new([0; 32], codec, 0.5);
+        let join = publisher.join(&table).expect("memory suffices");
+        let delta = publisher.publish(&table, &changes, 1.0).expect("memory suffices").expect("a change");
+        for (frame, kind) in [(join, "snapshot"), (delta, "delta")] {
+            let header = FrameHeader::parse(&frame.bytes, &Limits::default()).expect("a sound frame");
+            let payload = &frame.bytes[header.header_bytes..][..header.payload_bytes];
+            let first = u8::from(frame.kind == FrameKind::Delta);
+            seeds.push(("decode_cells", format!("{name}-{kind}-payload"), [&[first], payload].concat()));
+            seeds.push(("decode_cells", format!("{name}-{kind}-frame"), frame.bytes));
+        }
+    }
+    // One grid of 2 × 2 × 2 cells and one bucket; one entry, one cell.
+    let mut body = vec![128];
+    body.extend([0; 32]);
+    body.extend([0.1f32, 0.2].iter().flat_map(|f| f.to_le_bytes()));
+    body.extend([1, 7]);
+    body.extend([0; 12]);
+    body.extend([2, 2, 2, 1]);
+    let contents = |body: &mut Vec<u8>| {
+        body.extend([1, 0, 1, 0, 3, 0, 0, 0, 1, 0, 0, 0]);
+        body.extend([0; 56]);
+        body.extend([9, 0x77, 0x11, 0x84]);
+        body.extend([0; 24]);
+    };
+    contents(&mut body);
+    seeds.push(("decode_cells", "snapshot-body".to_owned(), body));
+    let mut body = vec![129];
+    contents(&mut body);
+    seeds.push(("decode_cells", "delta-body".to_owned(), body));
 }
 
 /// A recording of two seconds of frames at their times.

@@ -4,6 +4,7 @@
 //! (`README.md`).
 
 mod camera_path;
+mod cells;
 pub mod corpus;
 mod frame;
 mod input;
@@ -14,6 +15,7 @@ mod soup;
 mod weights;
 
 pub use camera_path::read_camera_path;
+pub use cells::decode_cells;
 pub use frame::decode_frame;
 pub use input::Random;
 pub use recording::read_recording;
@@ -26,8 +28,9 @@ pub use weights::read_weights;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 7] = [
+pub const TARGETS: [Target; 8] = [
     ("decode_frame", decode_frame),
+    ("decode_cells", decode_cells),
     ("session_ops", session_ops),
     ("read_recording", read_recording),
     ("load_scene", load_scene),

@@ -242,6 +242,10 @@ pub(crate) enum Method {
     PsaoHat {
         radius: f32,
     },
+    /// The paper's whole scheme, server, wire and client.
+    PsaoPaper,
+    /// The paper's scheme with least squares at every sample.
+    PsaoPaperMls,
     Rtao {
         rays: u32,
     },
@@ -251,7 +255,12 @@ pub(crate) enum Method {
 impl Method {
     /// Whether it depends on points and server rate.
     pub(crate) fn uses_points(self) -> bool {
-        matches!(self, Method::Psao | Method::PsaoMls | Method::PsaoHat { .. })
+        matches!(self, Method::Psao | Method::PsaoMls | Method::PsaoHat { .. }) || self.is_paper()
+    }
+
+    /// Whether its server and its stream are the paper's.
+    pub(crate) fn is_paper(self) -> bool {
+        matches!(self, Method::PsaoPaper | Method::PsaoPaperMls)
     }
 }
 
@@ -262,6 +271,8 @@ impl std::fmt::Display for Method {
             Method::PsaoMls => write!(f, "psao-mls"),
             Method::PsaoHat { radius: 1.0 } => write!(f, "psao-hat"),
             Method::PsaoHat { radius } => write!(f, "psao-hat-{radius}"),
+            Method::PsaoPaper => write!(f, "psao-paper"),
+            Method::PsaoPaperMls => write!(f, "psao-paper-mls"),
             Method::Rtao { rays } => write!(f, "rtao-{rays}"),
             Method::None => write!(f, "none"),
         }
@@ -276,6 +287,8 @@ impl FromStr for Method {
             "psao" => Ok(Method::Psao),
             "psao-mls" => Ok(Method::PsaoMls),
             "psao-hat" => Ok(Method::PsaoHat { radius: 1.0 }),
+            "psao-paper" => Ok(Method::PsaoPaper),
+            "psao-paper-mls" => Ok(Method::PsaoPaperMls),
             "none" => Ok(Method::None),
             "rtao" => Ok(Method::Rtao { rays: 16 }),
             _ => {
@@ -286,7 +299,7 @@ impl FromStr for Method {
                     (_, Some(radius)) if (0.1..=8.0).contains(&radius) => Ok(Method::PsaoHat { radius }),
                     _ => Err(
                         "known methods: psao, psao-mls, psao-hat, psao-hat-F with its radius times F from 0.1 to 8, \
-                              rtao-R with R from 1 to 65536 (rtao-16), none"
+                              psao-paper, psao-paper-mls, rtao-R with R from 1 to 65536 (rtao-16), none"
                             .into(),
                     ),
                 }
@@ -418,6 +431,9 @@ mod tests {
             assert!(text.parse::<Size>().is_err(), "{text}");
         }
         assert_eq!("rtao-512".parse(), Ok(Method::Rtao { rays: 512 }));
+        for method in [Method::PsaoPaper, Method::PsaoPaperMls, Method::PsaoHat { radius: 1.5 }] {
+            assert_eq!(method.to_string().parse(), Ok(method));
+        }
         for text in ["rtao-0", "rtao-x", "ssao", ""] {
             assert!(text.parse::<Method>().is_err(), "{text}");
         }

@@ -12,6 +12,7 @@ mod camera;
 mod hash;
 mod light;
 pub mod load;
+mod local;
 mod material;
 mod mesh;
 pub mod path;

@@ -196,8 +196,8 @@ fn bind_transforms(skin: &Skin, world_from_node: &[Affine3A]) -> Vec<Affine3A> {
     joints.map(|(&joint, bind)| world_from_node[joint as usize] * *bind).collect()
 }
 
-/// Rotation and place of a transform, for cameras: the view axis is kept, up as near as possible.
-fn without_scale(world: &Affine3A) -> Affine3A {
+/// Rotation and place of a transform, for cameras and local spaces: the view axis is kept, up as near as possible.
+pub(crate) fn without_scale(world: &Affine3A) -> Affine3A {
     let z = world.matrix3.z_axis.try_normalize().unwrap_or(Vec3A::Z);
     let x = world.matrix3.y_axis.cross(z).try_normalize();
     let x = x.unwrap_or_else(|| Vec3A::from(Vec3::from(z).any_orthonormal_vector()));

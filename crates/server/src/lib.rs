@@ -4,6 +4,8 @@
 //! pose(now) ─► tracer ─► updater (what changed) ─► publisher ─► frames for every subscriber
 //! ```
 
+pub mod paper;
+
 use std::sync::Arc;
 
 use dapple_scene::glam::Vec3;
@@ -15,6 +17,7 @@ use dapple_trace::psao::cuts::find_cuts;
 use dapple_trace::psao::generate::{
     GenerateError, GenerateParams, GeneratedPoints, check_density, generate_points,
 };
+use dapple_trace::psao::paper::PaperError;
 use dapple_trace::psao::update::{StepCounts, StepInput, UpdateError, UpdateParams, Updater};
 
 /// Settings of a server. Each group documents its own ranges and defaults.
@@ -73,6 +76,9 @@ pub enum ServerError {
     /// Settings of the update are out of range.
     #[error(transparent)]
     Update(#[from] UpdateError),
+    /// The paper's table could not be made.
+    #[error(transparent)]
+    Paper(#[from] PaperError),
     /// The changes could not be published.
     #[error(transparent)]
     Publish(#[from] PublishError),

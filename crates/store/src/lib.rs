@@ -3,5 +3,6 @@
 //! This crate is the contract between server and client. It knows nothing of bytes on a wire (that is
 //! `stream`), of rays (`trace`) or of pixels (`render`).
 
+pub mod cells;
 pub mod charts;
 pub mod points;

@@ -11,8 +11,8 @@ mod decode;
 mod encode;
 mod frame;
 mod plane;
-mod section;
-mod varint;
+pub(crate) mod section;
+pub(crate) mod varint;
 
 pub(crate) use decode::{decode_layout, decode_steps, decode_values, parse_delta, parse_snapshot};
 #[cfg(feature = "zstd")]
@@ -110,7 +110,7 @@ pub enum DecodeError {
 }
 
 /// The start of every Zstandard frame, which sections leave out.
-const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
+pub(crate) const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
 /// Maps small differences of either sign, modulo 256, to small bytes.
 #[cfg(feature = "zstd")]

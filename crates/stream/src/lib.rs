@@ -3,13 +3,14 @@
 //! A [`Publisher`] (feature `zstd`) turns the states of a [`PointStore`](dapple_store::points::PointStore) into
 //! [`Frame`]s; a [`Subscriber`] turns any bytes back into the same store, bit for bit, or names what is wrong
 //! with them. The frames are specified in `docs/wire.md`; [`codec`] is the bits, [`session`] the order. Frames kept
-//! in a file are a [`recording`].
+//! in a file are a [`recording`]. Beside it stands what the paper sends, [`cells`], to be compared with.
 
 #![cfg_attr(
     test,
     allow(clippy::unwrap_used, reason = "in a test, a failed unwrap is a failure like any other")
 )]
 
+pub mod cells;
 pub mod codec;
 pub mod recording;
 pub mod session;

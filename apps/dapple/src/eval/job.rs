@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::figures::{FrameError, jackknife, mean, mean_of_all, pooled_psnr, root_mean_square};
 use super::pair::{Pair, Start, Starts};
+use super::paper::AnyServer;
 use super::plan::CLIENT_HZ;
 use super::results::{Figure, FrameRow, Machine, Params, Row, Settling, Times, Truth};
 use super::settle::settle;
@@ -24,7 +25,7 @@ use crate::picture::{Compared, Shown, sites};
 /// What is run together.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Job {
-    /// One server, looked up in several ways.
+    /// One server, looked up in several ways: all of the paper's scheme, or none.
     Points { points_per_m2: f32, hz: f64, methods: Vec<Method> },
     /// A method without a server.
     Alone(Method),
@@ -67,7 +68,10 @@ pub(super) fn jobs(stage: &Stage<'_>) -> Vec<Job> {
     if !with_points.is_empty() {
         for &points_per_m2 in &settings.points_per_m2 {
             for &hz in &settings.hz {
-                jobs.push(Job::Points { points_per_m2, hz, methods: with_points.clone() });
+                let (paper, own): (Vec<Method>, Vec<Method>) = with_points.iter().partition(|m| m.is_paper());
+                for methods in [own, paper].into_iter().filter(|methods| !methods.is_empty()) {
+                    jobs.push(Job::Points { points_per_m2, hz, methods });
+                }
             }
         }
     }
@@ -79,9 +83,22 @@ impl Job {
     /// A few words, also for file names.
     pub(super) fn name(&self) -> String {
         match self {
-            Job::Points { points_per_m2, hz, .. } => format!("points-{points_per_m2}-{hz}hz"),
+            Job::Points { points_per_m2, hz, .. } => {
+                let scheme = if self.is_paper() { "paper" } else { "points" };
+                format!("{scheme}-{points_per_m2}-{hz}hz")
+            }
             Job::Alone(method) => method.to_string(),
         }
+    }
+
+    /// Whether its ends are the paper's.
+    fn is_paper(&self) -> bool {
+        self.methods().iter().any(|m| m.is_paper())
+    }
+
+    /// Whether what its server sends can be kept in a recording.
+    pub(super) fn can_be_recorded(&self) -> bool {
+        matches!(self, Job::Points { .. }) && !self.is_paper()
     }
 
     fn methods(&self) -> Vec<Method> {
@@ -118,10 +135,11 @@ impl Job {
             Job::Points { points_per_m2, hz, .. } => {
                 let start = Start::new(stage, *points_per_m2);
                 let server = starts.server(stage.loaded, &start, &|part| progress(0.3 * part))?;
+                let server = AnyServer::new(server, self.is_paper(), stage.settings.threshold)?;
                 let pair = Pair::new(server, (*points_per_m2, *hz), stage, desk.record)?;
                 if self.methods().contains(&Method::Psao) {
                     // Made once a session, so not what a picture costs.
-                    pair.client.atlas();
+                    pair.client.make_atlas();
                 }
                 Some(pair)
             }
@@ -172,7 +190,8 @@ impl Job {
 fn reconstruction(method: Method) -> Option<Reconstruction> {
     match method {
         Method::Psao => Some(Reconstruction::Atlas),
-        Method::PsaoMls => Some(Kernel::default().into()),
+        Method::PsaoMls | Method::PsaoPaperMls => Some(Kernel::default().into()),
+        Method::PsaoPaper => Some(Kernel::Hat(Hat::default()).into()),
         Method::PsaoHat { radius } => Some(Kernel::Hat(Hat { radius, ..Hat::default() }).into()),
         Method::Rtao { .. } | Method::None => None,
     }

@@ -10,6 +10,7 @@ mod figures;
 mod job;
 mod journal;
 mod pair;
+mod paper;
 mod plan;
 pub(crate) mod quality;
 mod reference;

@@ -2,15 +2,15 @@
 
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
-use dapple_client::Client;
+use anyhow::{Context, Result};
 use dapple_scene::{CameraPath, Pose, Scene};
 use dapple_server::{Progress, Server, ServerConfig};
-use dapple_stream::{Limits, Recorder, RecordingHeader};
+use dapple_stream::{Recorder, RecordingHeader};
 use dapple_trace::Tracer;
 use dapple_trace::psao::generate::{GenerateParams, generate_points};
 use dapple_trace::psao::update::{ConvexVolume, StepInput, UpdateParams};
 
+use super::paper::{AnyClient, AnyServer};
 use super::results::Steps;
 use super::stage::Stage;
 use crate::light::microseconds;
@@ -119,7 +119,7 @@ impl Starts {
 
 /// A server, its client, and what was counted between them.
 pub(super) struct Pair {
-    pub(super) client: Client,
+    pub(super) client: AnyClient,
     pub(super) points_per_m2: f32,
     pub(super) hz: f64,
     pub(super) snapshot_bytes: u64,
@@ -129,7 +129,7 @@ pub(super) struct Pair {
     pub(super) steps: Steps,
     pub(super) server_seconds: f64,
     pub(super) apply_seconds: f64,
-    server: Server,
+    server: AnyServer,
     ray_budget: Option<u64>,
     recording: Option<Recording>,
 }
@@ -152,29 +152,29 @@ struct Recording {
 impl Pair {
     /// A client joins the server at its start. `record` is the name of a recording to make.
     pub(super) fn new(
-        mut server: Server,
+        mut server: AnyServer,
         (points_per_m2, hz): (f32, f64),
         stage: &Stage<'_>,
         record: Option<&str>,
     ) -> Result<Pair> {
-        let mut client = Client::new(server.scene().clone(), Limits::default());
-        let Some(snapshot) = server.join()? else { bail!("the server has published nothing") };
-        client.receive(&snapshot.bytes).context("the client refused the server's snapshot")?;
+        let mut client = AnyClient::of(&server);
+        let snapshot = server.join()?;
+        client.receive(&snapshot).context("the client refused the server's snapshot")?;
         let mut recording = None;
         if let Some(name) = record {
             let duration_us = microseconds(stage.seconds);
             let scene_hash = server.scene().hash().0;
             let header = RecordingHeader { scene_hash, name: name.to_owned(), duration_us };
             let (mut recorder, mut bytes) = Recorder::new(&header).context("--record")?;
-            bytes.extend(recorder.frame(0, &snapshot.bytes)?);
+            bytes.extend(recorder.frame(0, &snapshot)?);
             recording = Some(Recording { recorder, bytes, duration_us });
         }
-        let rays = server.store().layout().len() as u64 * u64::from(stage.settings.point_rays);
+        let rays = server.points() * u64::from(stage.settings.point_rays);
         Ok(Pair {
             client,
             points_per_m2,
             hz,
-            snapshot_bytes: snapshot.bytes.len() as u64,
+            snapshot_bytes: snapshot.len() as u64,
             step_bytes: Vec::new(),
             rays,
             steps: Steps::default(),
@@ -198,21 +198,21 @@ impl Pair {
             let start = Instant::now();
             let interest = interest(tick_s, self.hz, self.ray_budget, stage);
             let input = StepInput { ray_budget: self.ray_budget, interest: &interest };
-            let report = self.server.step_with(tick_s, &input)?;
+            let report = self.server.step(tick_s, &input, stage)?;
             self.server_seconds += start.elapsed().as_secs_f64();
-            self.rays += report.rays;
+            self.rays += report.counts.rays();
             self.steps.add(&report.counts);
             let start = Instant::now();
             let mut bytes = 0;
             if let Some(frame) = &report.frame {
-                bytes = frame.bytes.len() as u32;
+                bytes = frame.len() as u32;
                 changed = true;
-                self.client.receive(&frame.bytes).context("the client refused the server's frame")?;
+                self.client.receive(frame).context("the client refused the server's frame")?;
             }
             self.apply_seconds += start.elapsed().as_secs_f64();
             if let (Some(recording), Some(frame)) = (&mut self.recording, &report.frame) {
                 let time_us = microseconds(tick_s).min(recording.duration_us);
-                recording.bytes.extend(recording.recorder.frame(time_us, &frame.bytes)?);
+                recording.bytes.extend(recording.recorder.frame(time_us, frame)?);
             }
             self.step_bytes.push(bytes);
         }
@@ -222,19 +222,19 @@ impl Pair {
     pub(super) fn step_at(&mut self, time_s: f64, stage: &Stage<'_>) -> Result<StepAt> {
         let interest = interest(time_s, self.hz, self.ray_budget, stage);
         let input = StepInput { ray_budget: self.ray_budget, interest: &interest };
-        let report = self.server.step_with(time_s, &input)?;
+        let report = self.server.step(time_s, &input, stage)?;
         if let Some(frame) = &report.frame {
-            self.client.receive(&frame.bytes).context("the client refused the server's frame")?;
+            self.client.receive(frame).context("the client refused the server's frame")?;
         }
         Ok(StepAt { changed: report.frame.is_some(), backlog: report.counts.backlog })
     }
 
     pub(super) fn points(&self) -> u64 {
-        self.server.store().layout().len() as u64
+        self.server.points()
     }
 
     pub(super) fn cut_bytes(&self) -> u64 {
-        self.server.cut_bytes() as u64
+        self.server.cut_bytes()
     }
 
     /// The whole recording, if one was made.

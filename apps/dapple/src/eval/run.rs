@@ -314,10 +314,8 @@ impl Run<'_> {
         }));
         let what = format!("{name}: {}", job.name());
         let work = job.work(stage);
-        let record = match job {
-            Job::Points { .. } => self.record.map(|file| self.recording_file(file, stage, job, slug)),
-            Job::Alone(_) => None,
-        };
+        let recorded = self.record.filter(|_| job.can_be_recorded());
+        let record = recorded.map(|file| self.recording_file(file, stage, job, slug));
         // A file of that name may be another setting's.
         let recorded = |outcome: &Outcome| match &record {
             None => true,
@@ -350,7 +348,7 @@ impl Run<'_> {
 
     /// `file` itself where only one setting records, otherwise with the setting in its name.
     fn recording_file(&self, file: &Path, stage: &Stage<'_>, job: &Job, slug: &str) -> PathBuf {
-        let with_points = jobs(stage).iter().filter(|j| matches!(j, Job::Points { .. })).count();
+        let with_points = jobs(stage).iter().filter(|j| j.can_be_recorded()).count();
         if self.one_case && with_points == 1 {
             return file.to_owned();
         }

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::{RenderError, projection, texture};
 pub(crate) use raster::{Sink, Triangle, View, barycentrics, draw};
-pub use surface::{RestSurface, Surface};
+pub use surface::{LocalSurface, RestSurface, Surface};
 
 /// The instance index of a sample that sees the background.
 pub const NO_INSTANCE: u32 = u32::MAX;

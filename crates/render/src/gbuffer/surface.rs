@@ -42,6 +42,17 @@ pub struct RestSurface {
     pub normal_rest: Vec3,
 }
 
+/// Where a sample's place on its mesh is in the posed local space of another time ([`Scene::local_from_posed`]).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LocalSurface {
+    /// Index into [`Scene::instances`].
+    pub instance: u32,
+    /// Metres.
+    pub position_local: Vec3,
+    /// Unit normal of the posed triangle, to the side that the sample sees; zero where it has collapsed.
+    pub normal_local: Vec3,
+}
+
 impl GBuffer {
     /// The surface that a sample sees; `None` for the background, and for an index that is out of range (of the
     /// buffer, or because the scene or pose is another than the one drawn).
@@ -75,6 +86,37 @@ impl GBuffer {
     pub fn surface_rest(&self, scene: &Scene, sample_index: usize) -> Option<RestSurface> {
         let sample = self.samples.get(sample_index).filter(|s| s.is_covered())?;
         Found::new(scene, sample).map(|found| found.rest_surface())
+    }
+
+    /// Where the place on the mesh that a sample sees is in its instance's local space at `pose`, which may be of another time
+    /// than the one drawn ([Neff2023] sec. 3.5); `None` as in [`GBuffer::surface`].
+    pub fn surface_local(&self, scene: &Scene, pose: &Pose, sample_index: usize) -> Option<LocalSurface> {
+        let sample = self.samples.get(sample_index).filter(|s| s.is_covered())?;
+        let found = Found::new(scene, sample)?;
+        let instance = sample.instance as usize;
+        pose.instances.get(instance)?;
+        let local_from_posed = scene.local_from_posed(pose, instance);
+        let vertices = scene.vertex_positions(pose, instance);
+        let mut corners = [Vec3::ZERO; 3];
+        for (corner, &v) in corners.iter_mut().zip(&found.indices) {
+            *corner = local_from_posed.transform_point3(*vertices.get(v as usize)?);
+        }
+        Some(LocalSurface {
+            instance: sample.instance,
+            position_local: blend(corners, found.weights),
+            normal_local: found.geometric_normal(&corners, Mat3::from(local_from_posed.matrix3)),
+        })
+    }
+
+    /// `f` of [`GBuffer::surface_local`] of every sample, in parallel, in the order of the samples.
+    pub fn map_surfaces_local<T: Send>(
+        &self,
+        scene: &Scene,
+        pose: &Pose,
+        f: impl Fn(usize, Option<&LocalSurface>) -> T + Sync,
+    ) -> Vec<T> {
+        let indices = (0..self.samples.len()).into_par_iter().with_min_len(1024);
+        indices.map(|i| f(i, self.surface_local(scene, pose, i).as_ref())).collect()
     }
 
     /// `f` of the surface of every sample (`None` for the background), in parallel, in the order of the samples.

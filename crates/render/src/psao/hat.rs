@@ -1,5 +1,7 @@
 //! The paper's kernel: a hat with two thresholds on normals ([Neff2023] eq. 2–4).
 
+use glam::Vec3;
+
 use super::PointIndex;
 use super::index::Near;
 use crate::gbuffer::RestSurface;
@@ -22,6 +24,18 @@ impl Default for Hat {
 }
 
 impl Hat {
+    /// Weight of a point at `to_point` (metres) from a fragment, both with unit normals; `radius_m` is r. 0 … 1.
+    pub(super) fn weight(&self, to_point: Vec3, point_normal: Vec3, normal: Vec3, radius_m: f32) -> f32 {
+        let distance = to_point.length();
+        // [Neff2023] eq. 2
+        let alpha = ((radius_m - distance) / radius_m).max(0.0);
+        // [Neff2023] eq. 3; a point at the fragment itself has no direction and passes.
+        let along = if distance > 0.0 { point_normal.dot(to_point) / distance } else { 0.0 };
+        let counts =
+            point_normal.dot(normal) > self.normal_threshold && along * along < self.direction_threshold;
+        if counts { alpha } else { 0.0 }
+    }
+
     pub(super) fn visibility(
         &self,
         index: &PointIndex,
@@ -34,16 +48,7 @@ impl Hat {
         let (mut sum, mut weights) = (0.0f32, 0.0f32);
         for p in &near.points {
             let to_point = p.position_rest - fragment.position_rest;
-            let distance = to_point.length();
-            // [Neff2023] eq. 2
-            let mut alpha = ((r - distance) / r).max(0.0);
-            // [Neff2023] eq. 3; a point at the fragment itself has no direction and passes.
-            let along = if distance > 0.0 { p.normal_rest.dot(to_point) / distance } else { 0.0 };
-            if p.normal_rest.dot(fragment.normal_rest) <= self.normal_threshold
-                || along * along >= self.direction_threshold
-            {
-                alpha = 0.0;
-            }
+            let alpha = self.weight(to_point, p.normal_rest, fragment.normal_rest, r);
             sum += alpha * f32::from(visibility[p.point as usize]);
             weights += alpha;
         }

@@ -8,6 +8,7 @@ pub mod hash;
 mod hat;
 mod index;
 mod mls;
+pub mod paper;
 mod tables;
 #[cfg(test)]
 mod tests;

@@ -1,5 +1,6 @@
 //! Tables of 16-byte texels: what a look-up reads, in Rust as a slice and in a fragment shader as textures.
 
+use dapple_store::cells::{GridTooLarge, VirtualGrid};
 use dapple_store::points::{PointLayout, PointSet};
 use glam::Vec3;
 
@@ -90,76 +91,34 @@ impl Tables {
     }
 }
 
-/// The virtual grid of one instance ([Neff2023] sec. 3.2): every cell has a number, few exist.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct VirtualGrid {
-    pub(super) origin_rest: Vec3,
-    pub(super) dims: [u32; 3],
-    /// The instance's first entry in the table of slots, and how many it has.
-    pub(super) first: u32,
-    pub(super) count: u32,
+/// Around a set's points, with cells of `edge_m`; without slots yet.
+pub(super) fn grid_around(
+    set: &PointSet,
+    layout: &PointLayout,
+    edge_m: f32,
+) -> Result<VirtualGrid, TableError> {
+    let grid = VirtualGrid { origin: set.origin_rest, ..VirtualGrid::default() };
+    // The origin is the least corner of the layout's integers, so nothing lies below it.
+    let most = (0..set.len())
+        .map(|i| grid.position_cells(set.position_rest(i, layout.quantum_m()), edge_m))
+        .fold(Vec3::ZERO, Vec3::max);
+    VirtualGrid::spanning(set.origin_rest, most).map_err(|GridTooLarge { cells }| TableError::GridTooLarge {
+        instance: set.instance,
+        cells,
+        edge_m,
+    })
 }
 
-impl VirtualGrid {
-    /// Around a set's points, with cells of `edge_m`; without slots yet.
-    pub(super) fn around(
-        set: &PointSet,
-        layout: &PointLayout,
-        edge_m: f32,
-    ) -> Result<VirtualGrid, TableError> {
-        let mut grid = VirtualGrid { origin_rest: set.origin_rest, dims: [1; 3], first: 0, count: 0 };
-        let most = (0..set.len())
-            .map(|i| grid.position_cells(set.position_rest(i, layout.quantum_m()), edge_m))
-            .fold(Vec3::ZERO, Vec3::max);
-        // The origin is the least corner of the layout's integers, so nothing lies below it.
-        let dims = most.to_array().map(|c| f64::from(c.floor()) + 1.0);
-        let cells: f64 = dims.iter().product();
-        if cells.is_nan() || cells > f64::from(u32::MAX) {
-            return Err(TableError::GridTooLarge { instance: set.instance, cells, edge_m });
-        }
-        grid.dims = dims.map(|c| c as u32);
-        Ok(grid)
-    }
-
-    /// A position in units of cells from the grid's corner.
-    pub(super) fn position_cells(&self, position_rest: Vec3, edge_m: f32) -> Vec3 {
-        (position_rest - self.origin_rest) / edge_m
-    }
-
-    /// The cell that a position in cells falls into, held inside the grid against rounding.
-    pub(super) fn cell(&self, position_cells: Vec3) -> [u32; 3] {
-        let last = self.dims.map(|d| d - 1);
-        let cell = position_cells.to_array().map(|c| c.floor() as u32);
-        std::array::from_fn(|axis| cell[axis].min(last[axis]))
-    }
-
-    /// Number of a cell; unique, because `around` bounds the product of `dims`.
-    pub(super) fn key(&self, cell: [u32; 3]) -> u32 {
-        (cell[2] * self.dims[1] + cell[1]) * self.dims[0] + cell[0]
-    }
-
-    /// The 2×2×2 cells nearest to a position in cells, those outside the grid left out.
-    pub(super) fn nearest_cells(&self, position_cells: Vec3) -> impl Iterator<Item = [u32; 3]> {
-        let base = (position_cells - 0.5).floor().to_array().map(|c| c as i32);
-        let dims = self.dims;
-        (0..8).filter_map(move |corner| {
-            let cell: [i64; 3] = std::array::from_fn(|a| i64::from(base[a]) + (corner >> a & 1));
-            let inside = (0..3).all(|a| cell[a] >= 0 && cell[a] < i64::from(dims[a]));
-            inside.then(|| cell.map(|c| c as u32))
-        })
-    }
-
-    fn texels(&self) -> [[u32; 4]; 2] {
-        let [x, y, z] = self.origin_rest.to_array().map(f32::to_bits);
-        let [a, b, c] = self.dims;
-        [[x, y, z, self.first], [a, b, c, self.count]]
-    }
+fn grid_words(grid: &VirtualGrid) -> [[u32; 4]; 2] {
+    let [x, y, z] = grid.origin.to_array().map(f32::to_bits);
+    let [a, b, c] = grid.dims;
+    [[x, y, z, grid.first], [a, b, c, grid.count]]
 }
 
 /// The table of grids: one an instance up to the last that has points; those without have no slots.
 pub(super) fn grid_texels(params: [f32; 4], grids: &[VirtualGrid]) -> Vec<[u32; 4]> {
     let mut texels = vec![params.map(f32::to_bits), [grids.len() as u32, 0, 0, 0]];
-    texels.extend(grids.iter().flat_map(VirtualGrid::texels));
+    texels.extend(grids.iter().flat_map(grid_words));
     texels
 }
 

@@ -51,7 +51,7 @@ pub(crate) fn unpack(
 
 /// Expands to exactly `raw_bytes`. Memory grows with what really comes out, never beyond the stated size by more
 /// than a window (at most the next power of two) and a block (128 KiB).
-fn expand(coded: &[u8], raw_bytes: usize) -> Option<Vec<u8>> {
+pub(crate) fn expand(coded: &[u8], raw_bytes: usize) -> Option<Vec<u8>> {
     let mut decoder = FrameDecoder::new();
     decoder.set_max_window_size(raw_bytes.next_power_of_two().max(1024) as u64);
     let mut source = ZSTD_MAGIC.as_slice().chain(coded);

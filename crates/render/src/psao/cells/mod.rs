@@ -8,10 +8,11 @@ mod fit;
 mod tests;
 mod twin;
 
+use dapple_store::cells::VirtualGrid;
 use dapple_store::points::{Change, PointLayout};
 
 use super::MovingLeastSquares;
-use super::tables::{TableError, Tables, Texels, VirtualGrid, check_count, empty_grids, grid_texels};
+use super::tables::{TableError, Tables, Texels, check_count, empty_grids, grid_around, grid_texels};
 
 /// The function `cells_visibility` and its bindings (group 3, bindings 3 to 5), to be joined with a shader.
 pub const WGSL: &str = include_str!("cells.wgsl");
@@ -49,7 +50,7 @@ impl PointCells {
         let (mut slots, mut points) = (Vec::new(), Vec::with_capacity(layout.len()));
         let mut places = vec![0; layout.len()];
         for set in layout.sets() {
-            let mut grid = VirtualGrid::around(set, layout, edge_m)?;
+            let mut grid = grid_around(set, layout, edge_m)?;
             let position = |i: usize| set.position_rest(i, layout.quantum_m());
             let key = |i: usize| grid.key(grid.cell(grid.position_cells(position(i), edge_m)));
             let mut keyed: Vec<(u32, u32)> = (0..set.len()).map(|i| (key(i), i as u32)).collect();

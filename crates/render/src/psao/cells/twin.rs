@@ -1,5 +1,6 @@
 //! The look-up of `cells.wgsl` in Rust, step by step.
 
+use dapple_store::cells::VirtualGrid;
 use dapple_store::points::PackedNormal;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -7,7 +8,6 @@ use rayon::prelude::*;
 use super::fit::Fit;
 use super::{PointCells, hash};
 use crate::gbuffer::RestSurface;
-use crate::psao::tables::VirtualGrid;
 
 /// The point that serves where nothing has weight.
 struct Nearest {

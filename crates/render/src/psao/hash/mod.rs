@@ -3,39 +3,19 @@
 //! Takes a layout, its values and a [`Hat`]; returns tables for [`PointHash::visibility`] and for `hash.wgsl`, which
 //! agree. See `README.md`.
 
-mod pack;
 #[cfg(test)]
 mod tests;
 mod twin;
 
+pub use dapple_store::cells::{BUCKET_CELLS, CELL_POINTS, Overflow};
+use dapple_store::cells::{PackedPoint, VirtualGrid, buckets_for, pack_normal};
 use dapple_store::points::{Change, PointLayout};
 
 use super::Hat;
-use super::tables::{TableError, Tables, Texels, VirtualGrid, check_count, empty_grids, grid_texels};
-
-/// Points in a cell ([Neff2023] sec. 3.2).
-pub const CELL_POINTS: usize = 7;
-/// Entries in a bucket ([Neff2023] sec. 3.2).
-pub const BUCKET_CELLS: usize = 8;
+use super::tables::{TableError, Tables, Texels, check_count, empty_grids, grid_around, grid_texels};
 
 /// The function `hash_visibility` and its bindings (group 3, bindings 0 to 2), to be joined with a shader.
 pub const WGSL: &str = include_str!("hash.wgsl");
-
-/// Points that found no place. The paper discards them and so does this; nothing else fails.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Overflow {
-    /// Points whose cell held seven already.
-    pub cell: u32,
-    /// Points whose cell found its bucket full.
-    pub bucket: u32,
-}
-
-impl Overflow {
-    /// All discarded points.
-    pub fn points(&self) -> u32 {
-        self.cell + self.bucket
-    }
-}
 
 /// The tables of the paper's look-up, as a client holds them.
 ///
@@ -55,10 +35,6 @@ pub struct PointHash {
 
 const DISCARDED: u32 = u32::MAX;
 
-/// An edge of √3/2 · spacing² of surface belongs to each point: Poisson disks in a hexagonal packing, whose densest
-/// radius defines the spacing.
-const AREA_OF_A_POINT: f64 = 0.866_025_403_784_438_6;
-
 impl PointHash {
     /// Sorts a layout's points into cells; `visibility` are the store's values in its order.
     ///
@@ -68,23 +44,20 @@ impl PointHash {
         check_count(layout, visibility)?;
         let radius_m = hat.radius * layout.spacing_m();
         let edge_m = 2.0 * radius_m;
-        let edge_spacings = 2.0 * f64::from(hat.radius);
-        let points_a_cell = edge_spacings * edge_spacings / AREA_OF_A_POINT;
         let mut grids = empty_grids(layout);
         let mut builder = Builder { places: vec![DISCARDED; layout.len()], ..Builder::default() };
         for set in layout.sets() {
-            let mut grid = VirtualGrid::around(set, layout, edge_m)?;
-            let expected = (set.len() as f64 / points_a_cell).ceil().max(1.0) as u32;
+            let mut grid = grid_around(set, layout, edge_m)?;
             grid.first = builder.buckets.len() as u32;
-            grid.count = (4 * expected).div_ceil(BUCKET_CELLS as u32);
+            grid.count = buckets_for(set.len(), 2.0 * f64::from(hat.radius));
             builder.buckets.resize(builder.buckets.len() + grid.count as usize, [0; BUCKET_CELLS]);
             for i in 0..set.len() {
                 let position = grid.position_cells(set.position_rest(i, layout.quantum_m()), edge_m);
                 let cell = grid.cell(position);
                 let point = set.first as usize + i;
-                let normal = pack::pack_normal(set.normal_rest(i));
-                let word = pack::pack(position, cell, normal, visibility[point]);
-                builder.add(&grid, cell, point, word);
+                let normal = pack_normal(set.normal_rest(i));
+                let packed = PackedPoint::pack(position, cell, normal, visibility[point]);
+                builder.add(&grid, cell, point, packed.0);
             }
             grids[set.instance as usize] = grid;
         }
@@ -104,7 +77,7 @@ impl PointHash {
             let place = self.places.get(change.point as usize).copied().unwrap_or(DISCARDED);
             if place != DISCARDED {
                 let word = &mut self.tables.points.get_mut(place as usize / 4)[place as usize % 4];
-                *word = pack::with_visibility(*word, change.visibility);
+                *word = PackedPoint(*word).with_visibility(change.visibility).0;
             }
         }
     }
@@ -151,15 +124,6 @@ impl PointHash {
     }
 }
 
-/// [Neff2023] eq. 1, taken modulo the number of buckets.
-fn bucket_of(grid: &VirtualGrid, cell: [u32; 3]) -> u32 {
-    let [dx, dy, _] = grid.dims;
-    let h = cell[0]
-        .wrapping_add(cell[1].wrapping_mul(dx).wrapping_mul(17))
-        .wrapping_add(cell[2].wrapping_mul(dx).wrapping_mul(dy).wrapping_mul(31));
-    grid.first + h % grid.count
-}
-
 /// Two texels of each row of eight words.
 fn halves(rows: &[[u32; 8]]) -> Vec<[u32; 4]> {
     rows.iter().flat_map(|&[a, b, c, d, e, f, g, h]| [[a, b, c, d], [e, f, g, h]]).collect()
@@ -177,7 +141,7 @@ struct Builder {
 impl Builder {
     fn add(&mut self, grid: &VirtualGrid, cell: [u32; 3], point: usize, word: u32) {
         let key = grid.key(cell);
-        let bucket = &mut self.buckets[bucket_of(grid, cell) as usize];
+        let bucket = &mut self.buckets[grid.bucket(cell) as usize];
         let at =
             bucket.iter().position(|&entry| entry == 0 || self.cells[entry as usize - 1][CELL_POINTS] == key);
         let Some(at) = at else {

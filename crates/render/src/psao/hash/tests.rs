@@ -1,8 +1,8 @@
 //! The paper's structure: nothing is lost but what overflows, and the kernel is the paper's.
 
+use dapple_store::cells::AREA_OF_A_POINT;
 use dapple_store::points::{PackedNormal, PointSet, morton_code};
 use glam::Vec3;
-use proptest::prelude::*;
 
 use super::*;
 use crate::gbuffer::RestSurface;
@@ -66,11 +66,11 @@ fn hat_over_packed_points(layout: &PointLayout, values: &[u8], fragment: &RestSu
     for (i, &value) in values.iter().enumerate() {
         let position_cells = (set.position_rest(i, QUANTUM) - set.origin_rest) / edge;
         let cell = position_cells.floor();
-        let normal = pack::pack_normal(set.normal_rest(i));
-        let word = pack::pack(position_cells, cell.to_array().map(|c| c as u32), normal, value);
-        let position_rest = set.origin_rest + (cell + pack::position_in_cell(word)) * edge;
+        let normal = pack_normal(set.normal_rest(i));
+        let point = PackedPoint::pack(position_cells, cell.to_array().map(|c| c as u32), normal, value);
+        let position_rest = set.origin_rest + (cell + point.position_in_cell()) * edge;
         let to_point = position_rest - fragment.position_rest;
-        let (distance, point_normal) = (to_point.length(), pack::normal(word));
+        let (distance, point_normal) = (to_point.length(), point.normal());
         let along = point_normal.dot(to_point) / distance;
         if distance < r
             && point_normal.dot(fragment.normal_rest) > hat.normal_threshold
@@ -138,26 +138,4 @@ fn a_grid_of_too_many_cells_is_refused() {
     layout = PointLayout::new(QUANTUM, SPACING / 16.0, layout.sets().to_vec()).unwrap();
     let error = PointHash::new(&layout, &[0, 0], Hat::default()).unwrap_err();
     assert!(matches!(error, TableError::GridTooLarge { instance: 2, .. }), "{error}");
-}
-
-proptest! {
-    #[test]
-    fn a_packed_point_keeps_what_it_has_room_for(
-        x in 0f32..1.0, y in 0f32..1.0, z in 0f32..1.0,
-        nx in -1f32..1.0, ny in -1f32..1.0, nz in -1f32..1.0, visibility: u8, other: u8,
-    ) {
-        prop_assume!(Vec3::new(nx, ny, nz).length() > 1e-3);
-        let n = Vec3::new(nx, ny, nz).normalize();
-        let cell = [3, 0, 9];
-        let inside = Vec3::new(x, y, z);
-        let word = pack::pack(inside + Vec3::new(3.0, 0.0, 9.0), cell, pack::pack_normal(n), visibility);
-        prop_assert!(word >> 31 == 1);
-        prop_assert!((pack::position_in_cell(word) - inside).abs().max_element() <= 0.5 / 32.0 + 1e-5);
-        // Seven steps to a side: 17.2 degrees at the worst, about (5, 5, 4).
-        prop_assert!(pack::normal(word).dot(n) > 0.955, "{} became {}", n, pack::normal(word));
-        prop_assert_eq!(pack::visibility(word), f32::from(visibility));
-        let changed = pack::with_visibility(word, other);
-        prop_assert_eq!(pack::visibility(changed), f32::from(other));
-        prop_assert_eq!(changed >> 8, word >> 8);
-    }
 }

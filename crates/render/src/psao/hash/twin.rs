@@ -1,11 +1,11 @@
 //! The look-up of `hash.wgsl` in Rust, step by step.
 
+use dapple_store::cells::{PackedPoint, VirtualGrid};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{BUCKET_CELLS, CELL_POINTS, PointHash, bucket_of, pack};
+use super::{BUCKET_CELLS, CELL_POINTS, PointHash};
 use crate::gbuffer::RestSurface;
-use crate::psao::tables::VirtualGrid;
 
 impl PointHash {
     /// Visibility 0 … 1 of a fragment ([Neff2023] eq. 4): 1 where no point has weight.
@@ -38,7 +38,7 @@ impl PointHash {
 
     /// A cell's index in the table of cells.
     fn find(&self, grid: &VirtualGrid, cell: [u32; 3]) -> Option<usize> {
-        let bucket = bucket_of(grid, cell) as usize;
+        let bucket = grid.bucket(cell) as usize;
         let key = grid.key(cell);
         for at in 0..BUCKET_CELLS {
             let entry = self.tables.slots.get(2 * bucket + at / 4)[at % 4] as usize;
@@ -54,18 +54,10 @@ impl PointHash {
 
     /// Adds one point; `corner` is the vector from the fragment to its cell's corner, in cells.
     fn add(&self, word: u32, corner: Vec3, normal_rest: Vec3, sums: &mut [f32; 2]) {
-        let to_point = (corner + pack::position_in_cell(word)) * self.edge_m;
-        let point_normal = pack::normal(word);
-        let distance = to_point.length();
-        // [Neff2023] eq. 2
-        let alpha = ((self.radius_m - distance) / self.radius_m).max(0.0);
-        // [Neff2023] eq. 3; a point at the fragment itself has no direction and passes.
-        let along = if distance > 0.0 { point_normal.dot(to_point) / distance } else { 0.0 };
-        if point_normal.dot(normal_rest) > self.hat.normal_threshold
-            && along * along < self.hat.direction_threshold
-        {
-            sums[0] += alpha * pack::visibility(word);
-            sums[1] += alpha;
-        }
+        let point = PackedPoint(word);
+        let to_point = (corner + point.position_in_cell()) * self.edge_m;
+        let alpha = self.hat.weight(to_point, point.normal(), normal_rest, self.radius_m);
+        sums[0] += alpha * f32::from(point.visibility());
+        sums[1] += alpha;
     }
 }

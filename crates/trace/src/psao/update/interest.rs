@@ -36,6 +36,11 @@ impl ConvexVolume {
         ConvexVolume { planes: planes.collect() }
     }
 
+    /// Whether a place lies inside.
+    pub fn contains(&self, position_world: Vec3) -> bool {
+        self.planes.iter().all(|plane| plane.truncate().dot(position_world) + plane.w >= 0.0)
+    }
+
     /// Whether a part of the box may lie inside; perhaps yes too often, never no when it does.
     pub fn touches(&self, bounds_world: &Aabb) -> bool {
         self.planes.iter().all(|plane| {

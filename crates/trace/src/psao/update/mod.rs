@@ -156,6 +156,18 @@ impl Updater {
         &self.store
     }
 
+    /// Where each point sits on its mesh, in the order of the store.
+    pub fn anchors(&self) -> &[Anchor] {
+        &self.anchors
+    }
+
+    /// The same with another threshold. With 0 the store holds, after each step without a budget, what every point's rays say.
+    #[must_use]
+    pub fn with_threshold(mut self, threshold: u8) -> Updater {
+        self.params.threshold = threshold;
+        self
+    }
+
     /// Where every point is in the world at `pose` (`None` where its triangle has collapsed), in the order of the store.
     pub fn positions_world(&self, scene: &Scene, pose: &Pose) -> Vec<Option<Vec3>> {
         let sets = self.store.layout().sets().iter();
