@@ -3,22 +3,28 @@
 //! A snapshot is a layout and one value a point. Points are in Morton order, so a position is the distance of
 //! its cell from the previous point's cell and the place within the cell; of that place one coordinate follows
 //! nearly from the other two, because points lie on surfaces whose normals are known ([`plane`]). With the layout come
-//! the cuts: which points do not count at which texels. A delta is
-//! gaps between changed points and the differences from the values the receiver holds.
+//! the cuts: which points do not count at which texels. Values, and what changed of them, are foretold from neighbours and
+//! written by an entropy coder (`values/`, `entropy/`); a delta builds on the values the receiver holds and on nothing else.
 
 mod decode;
 #[cfg(feature = "zstd")]
 mod encode;
+mod entropy;
 mod frame;
 mod plane;
 mod section;
+mod values;
 mod varint;
 
-pub(crate) use decode::{decode_layout, decode_steps, decode_values, parse_delta, parse_snapshot};
+pub(crate) use decode::{DecodedLayout, decode_changes, decode_layout, decode_values, parse_delta, parse_snapshot};
 #[cfg(feature = "zstd")]
-pub(crate) use encode::{delta_payload, encode_layout, snapshot_payload};
+pub(crate) use encode::{EncodedLayout, delta_payload, encode_layout, snapshot_payload};
 pub(crate) use frame::open;
 pub use frame::{FrameHeader, FrameKind, MAGIC, VERSION, seal};
+pub use values::ValueChange;
+#[cfg(feature = "zstd")]
+pub(crate) use values::{Fit, Goal};
+pub(crate) use values::{Near, Scratch};
 
 use dapple_store::points::LayoutError;
 

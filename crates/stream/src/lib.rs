@@ -14,8 +14,8 @@ pub mod codec;
 pub mod recording;
 pub mod session;
 
-pub use codec::{DecodeError, FrameHeader, FrameKind, Limits};
+pub use codec::{DecodeError, FrameHeader, FrameKind, Limits, ValueChange};
 pub use recording::{Recorder, Recording, RecordingError, RecordingHeader, Replay};
-pub use session::{Applied, IgnoreReason, ReceiveError, Subscriber, ValueChange};
+pub use session::{Applied, IgnoreReason, ReceiveError, Subscriber};
 #[cfg(feature = "zstd")]
-pub use session::{Frame, PublishError, Publisher, PublisherConfig};
+pub use session::{Frame, Precision, PublishError, Publisher, PublisherConfig};

@@ -8,5 +8,5 @@ mod publisher;
 mod subscriber;
 
 #[cfg(feature = "zstd")]
-pub use publisher::{Frame, PublishError, Publisher, PublisherConfig};
-pub use subscriber::{Applied, IgnoreReason, ReceiveError, Subscriber, ValueChange};
+pub use publisher::{Frame, Precision, PublishError, Publisher, PublisherConfig};
+pub use subscriber::{Applied, IgnoreReason, ReceiveError, Subscriber};

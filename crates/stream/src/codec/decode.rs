@@ -6,6 +6,8 @@ use glam::Vec3;
 
 use super::plane::{Plane, reference};
 use super::section::unpack;
+use super::entropy;
+use super::values::{Guide, MOST_FOLLOW, Near, Scale, Scratch, ValueChange, code_changes, code_values};
 use super::varint::Reader;
 use super::{DecodeError, Limits, unzigzag};
 
@@ -14,9 +16,6 @@ const MAX_GAP_BYTES: usize = 9;
 
 /// Most bytes of a varint below 2³².
 const MAX_SITE_GAP_BYTES: usize = 5;
-
-/// Most bytes of a varint below 2²⁴.
-const MAX_POINT_GAP_BYTES: usize = 4;
 
 /// The parts of a snapshot, the large ones still encoded.
 pub(crate) struct SnapshotParts<'a> {
@@ -31,6 +30,14 @@ pub(crate) struct DeltaParts<'a> {
     changes: Reader<'a>,
 }
 
+/// What the layout part of a snapshot says.
+pub(crate) struct DecodedLayout {
+    pub(crate) layout: PointLayout,
+    pub(crate) cuts: Cuts,
+    /// Bits of a coordinate within its cell.
+    pub(crate) local_bits: u32,
+}
+
 pub(crate) fn parse_snapshot(payload: &[u8]) -> Result<SnapshotParts<'_>, DecodeError> {
     let mut reader = Reader::new(payload);
     let scene_hash = reader.array("scene hash")?;
@@ -40,7 +47,7 @@ pub(crate) fn parse_snapshot(payload: &[u8]) -> Result<SnapshotParts<'_>, Decode
     Ok(SnapshotParts { scene_hash, layout, values })
 }
 
-pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<(PointLayout, Cuts), DecodeError> {
+pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<DecodedLayout, DecodeError> {
     let bad = |part, reason| DecodeError::Malformed { part, reason };
     let mut reader = Reader::new(bytes);
     let quantum_m = reader.f32("layout lengths")?;
@@ -101,7 +108,8 @@ pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<(PointLayou
     if !gaps.is_empty() {
         return Err(bad("cell gaps", "are more than there are points"));
     }
-    Ok((PointLayout::new(quantum_m, spacing_m, sets)?, cuts))
+    let layout = PointLayout::new(quantum_m, spacing_m, sets)?;
+    Ok(DecodedLayout { layout, cuts, local_bits })
 }
 
 /// The cuts that close a layout.
@@ -193,17 +201,13 @@ fn decode_sets(reader: &mut Reader<'_>, limits: &Limits) -> Result<(Vec<PointSet
     Ok((sets, counts))
 }
 
-/// The values of `points` points.
-pub(crate) fn decode_values(bytes: &[u8], points: usize) -> Result<Vec<u8>, DecodeError> {
-    let mut reader = Reader::new(bytes);
-    let mut values = unpack(&mut reader, "values", points, points)?;
-    if !reader.is_empty() {
-        return Err(DecodeError::Malformed { part: "values", reason: "have bytes after their section" });
-    }
-    let mut last = u8::MAX;
-    for value in &mut values {
-        last = last.wrapping_add(unzigzag(*value));
-        *value = last;
+/// The values of a layout's points.
+pub(crate) fn decode_values(bytes: &[u8], layout: &PointLayout, near: &Near) -> Result<Vec<u8>, DecodeError> {
+    let bad = |reason| DecodeError::Malformed { part: "values", reason };
+    let mut reader = entropy::Reader::new(bytes);
+    let values = code_values(&mut reader, layout, near, |_| 0).ok_or(bad("end early"))?;
+    if !reader.is_complete() {
+        return Err(bad("have bytes after their end"));
     }
     Ok(values)
 }
@@ -220,40 +224,44 @@ pub(crate) fn parse_delta(epoch: u64, payload: &[u8]) -> Result<DeltaParts<'_>, 
     Ok(DeltaParts { base_epoch, changes })
 }
 
-/// The changes of a delta for a store of `points` points: what to add, modulo 256, to which points. Indices
-/// strictly increase.
-pub(crate) fn decode_steps(parts: &DeltaParts<'_>, points: usize) -> Result<Vec<(u32, u8)>, DecodeError> {
+/// A guide for who reads: what it says does not count.
+struct Read;
+
+impl Guide for Read {
+    fn wants(&self, _: std::ops::Range<usize>) -> bool {
+        false
+    }
+
+    fn choose(&mut self, _: usize, _: i32, _: i32, _: i32) -> i32 {
+        0
+    }
+}
+
+/// What a delta changes of `values`, in order of point.
+pub(crate) fn decode_changes(
+    parts: &DeltaParts<'_>,
+    layout: &PointLayout,
+    near: &mut Near,
+    values: &[u8],
+    scratch: &mut Scratch,
+) -> Result<Vec<ValueChange>, DecodeError> {
     let bad = |part, reason| DecodeError::Malformed { part, reason };
     let mut reader = parts.changes;
-    let count = reader.varint("changes")?;
-    if count == 0 {
+    let scale = Scale { step: reader.byte("step")?, follow: reader.byte("share")? };
+    if scale.step == 0 {
+        return Err(bad("step", "is 0"));
+    }
+    if scale.follow > MOST_FOLLOW {
+        return Err(bad("share", "exceeds 2"));
+    }
+    let mut coded = entropy::Reader::new(reader.take(reader.len(), "changes")?);
+    let changes = code_changes(&mut coded, (layout, near), values, scale, &mut Read, scratch)
+        .ok_or(bad("changes", "end early"))?;
+    if changes.is_empty() {
         return Err(bad("changes", "are none"));
     }
-    if count > points as u64 {
-        return Err(bad("changes", "are more than there are points"));
+    if !coded.is_complete() {
+        return Err(bad("changes", "have bytes after their end"));
     }
-    let count = count as usize;
-    let gaps = unpack(&mut reader, "change gaps", count, MAX_POINT_GAP_BYTES * count)?;
-    let residuals = unpack(&mut reader, "change values", count, count)?;
-    if !reader.is_empty() {
-        return Err(bad("changes", "have bytes after their last section"));
-    }
-    let mut gaps = Reader::new(&gaps);
-    let mut next = 0u64;
-    let mut steps = Vec::with_capacity(count);
-    for residual in residuals {
-        let point = next.saturating_add(gaps.varint("change gaps")?);
-        if point >= points as u64 {
-            return Err(bad("change gaps", "name a point that does not exist"));
-        }
-        if residual == 0 {
-            return Err(bad("change values", "leave a value as it was"));
-        }
-        next = point + 1;
-        steps.push((point as u32, unzigzag(residual)));
-    }
-    if !gaps.is_empty() {
-        return Err(bad("change gaps", "are more than there are changes"));
-    }
-    Ok(steps)
+    Ok(changes)
 }

@@ -4,21 +4,29 @@ use dapple_store::charts::Cuts;
 use dapple_store::points::{PointLayout, morton_code};
 
 use super::plane::{Plane, reference};
+use super::entropy::Writer;
 use super::section::pack;
+use super::values::{Fit, Goal, Near, Scratch, ValueChange, code_changes, code_values};
 use super::varint::write_varint;
 use super::zigzag;
 
-/// Zstandard level of the layout and of snapshot values: made once a group, sent to everyone.
-const SNAPSHOT_LEVEL: i32 = 15;
-
-/// Zstandard level of deltas: made every epoch. Measured (benches/codec.rs): higher levels gain at most 3 %.
-const DELTA_LEVEL: i32 = 1;
+/// Zstandard level of the layout: made once, sent to everyone.
+const LAYOUT_LEVEL: i32 = 15;
 
 /// Most bits of a coordinate within its cell: they are coded as one byte.
 const MAX_LOCAL_BITS: u32 = 8;
 
-/// The layout part of a snapshot with the cuts that belong to it, and how many of its bytes the cuts are.
-pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts) -> Result<(Vec<u8>, usize), std::io::Error> {
+/// The layout part of a snapshot with the cuts that belong to it.
+#[derive(Clone, Debug)]
+pub(crate) struct EncodedLayout {
+    pub(crate) bytes: Vec<u8>,
+    /// How many of these are cuts.
+    pub(crate) cut_bytes: usize,
+    /// Bits of a coordinate within its cell.
+    pub(crate) local_bits: u32,
+}
+
+pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts) -> Result<EncodedLayout, std::io::Error> {
     let local_bits = local_bits(layout);
     let local_mask = (1u32 << local_bits) - 1;
     let mut out = Vec::new();
@@ -59,12 +67,12 @@ pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts) -> Result<(Vec<u8
     let [n0, n1] = &normals;
     let [l0, l1, l2] = &locals;
     for section in [n0, n1, &cell_gaps, l0, l1, l2] {
-        pack(&mut out, section, SNAPSHOT_LEVEL)?;
+        pack(&mut out, section, LAYOUT_LEVEL)?;
     }
     let without_cuts = out.len();
     encode_cuts(&mut out, cuts)?;
     let cut_bytes = out.len() - without_cuts;
-    Ok((out, cut_bytes))
+    Ok(EncodedLayout { bytes: out, cut_bytes, local_bits })
 }
 
 fn encode_cuts(out: &mut Vec<u8>, cuts: &Cuts) -> Result<(), std::io::Error> {
@@ -90,64 +98,45 @@ fn encode_cuts(out: &mut Vec<u8>, cuts: &Cuts) -> Result<(), std::io::Error> {
     }
     let [low, high] = &masks;
     for section in [&gaps, low, high] {
-        pack(out, section, SNAPSHOT_LEVEL)?;
+        pack(out, section, LAYOUT_LEVEL)?;
     }
     Ok(())
 }
 
-/// The payload of a snapshot; `layout` is what [`encode_layout`] gave for the layout of `visibility`.
+/// The payload of a snapshot; `encoded` is what [`encode_layout`] gave for `layout`, `visibility` one value a point.
 pub(crate) fn snapshot_payload(
     scene_hash: &[u8; 32],
-    layout: &[u8],
+    encoded: &EncodedLayout,
+    (layout, near): (&PointLayout, &Near),
     visibility: &[u8],
-) -> Result<Vec<u8>, std::io::Error> {
-    let mut out = Vec::with_capacity(layout.len() + visibility.len() / 2 + 64);
+) -> Vec<u8> {
+    let mut out = Vec::with_capacity(encoded.bytes.len() + visibility.len() / 2 + 64);
     out.extend(scene_hash);
-    write_varint(&mut out, layout.len() as u64);
-    out.extend(layout);
-    let mut last = u8::MAX;
-    let residuals: Vec<u8> = visibility
-        .iter()
-        .map(|&value| zigzag(value.wrapping_sub(std::mem::replace(&mut last, value))))
-        .collect();
-    pack(&mut out, &residuals, SNAPSHOT_LEVEL)?;
-    Ok(out)
+    write_varint(&mut out, encoded.bytes.len() as u64);
+    out.extend(&encoded.bytes);
+    let mut writer = Writer::new(out);
+    code_values(&mut writer, layout, near, |point| visibility[point]);
+    writer.finish()
 }
 
-/// The payload of a delta from `old` to `new` visibility, or nothing if they are equal.
-/// `epochs_back` is the distance from the frame's epoch to that of `old`, at least 1.
+/// The payload of a delta that brings `held` to within the goal, and what it changes. `epochs_back` is the distance from the
+/// frame's epoch to that of `held`, at least 1.
 pub(crate) fn delta_payload(
     epochs_back: u64,
-    old: &[u8],
-    new: &[u8],
-) -> Result<Option<Vec<u8>>, std::io::Error> {
-    /// Equal stretches of this many points are skipped at once.
-    const STRIDE: usize = 64;
-    let mut gaps = Vec::new();
-    let mut residuals = Vec::new();
-    let mut next = 0;
-    for (stretch, (old, new)) in old.chunks(STRIDE).zip(new.chunks(STRIDE)).enumerate() {
-        if old == new {
-            continue;
-        }
-        for (i, (&old, &new)) in old.iter().zip(new).enumerate() {
-            if old != new {
-                let point = stretch * STRIDE + i;
-                write_varint(&mut gaps, (point - next) as u64);
-                next = point + 1;
-                residuals.push(zigzag(new.wrapping_sub(old)));
-            }
-        }
-    }
-    if residuals.is_empty() {
-        return Ok(None);
-    }
+    (layout, near): (&PointLayout, &mut Near),
+    held: &[u8],
+    mut goal: Goal<'_>,
+    fit: &mut Fit,
+    scratch: &mut Scratch,
+) -> (Vec<u8>, Vec<ValueChange>) {
     let mut out = Vec::new();
     write_varint(&mut out, epochs_back);
-    write_varint(&mut out, residuals.len() as u64);
-    pack(&mut out, &gaps, DELTA_LEVEL)?;
-    pack(&mut out, &residuals, DELTA_LEVEL)?;
-    Ok(Some(out))
+    let scale = goal.scale(fit);
+    out.extend([scale.step, scale.follow]);
+    let mut writer = Writer::new(out);
+    let changes = code_changes(&mut writer, (layout, near), held, scale, &mut goal, scratch);
+    fit.learn(&goal);
+    (writer.finish(), changes.unwrap_or_default())
 }
 
 /// Bits of a coordinate within its cell, so that a cell is about as large as the points are apart: then most

@@ -54,7 +54,7 @@ pub(crate) fn reference(positions: &[[u32; 3]], normals: &[PackedNormal], i: usi
 }
 
 /// The direction of a packed normal, scaled so that the sum of its components' sizes is 127.
-fn direction(normal: PackedNormal) -> [i64; 3] {
+pub(crate) fn direction(normal: PackedNormal) -> [i64; 3] {
     let component = |b: u8| i64::from(b.min(254)) - 127;
     let (x, y) = (component(normal.0[0]), component(normal.0[1]));
     let z = 127 - x.abs() - y.abs();

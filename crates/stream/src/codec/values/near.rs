@@ -1,0 +1,174 @@
+//! Which points are near a point and coded before it: what its value is foretold from. Whole numbers throughout.
+
+use dapple_store::points::{PackedNormal, PointLayout};
+
+use crate::codec::plane::direction;
+
+/// Points of a block: they are asked for together.
+pub(crate) const BLOCK: usize = 64;
+
+/// How many neighbours a point has.
+pub(crate) const NEIGHBOURS: usize = 4;
+
+/// What each counts for, the nearest first, in 8ths.
+pub(crate) const SHARES: [i32; NEIGHBOURS] = [3, 2, 2, 1];
+
+/// Most blocks that neighbours are looked for in.
+const BLOCKS_SEARCHED: usize = 12;
+
+/// How far a neighbour may lie back in the order of points.
+const MOST_BACK: usize = u16::MAX as usize;
+
+/// How much farther points with other normals count: as this over 4096 for each squared step between them.
+const ALIKE: u64 = 4096;
+
+/// How many points back each neighbour is, for each point of a block. 0: there is none.
+pub(crate) type Back = [[u16; NEIGHBOURS]; BLOCK];
+
+/// Neighbours, found when they are first asked for, block by block.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Near {
+    /// How far neighbours may be, steps of integer coordinates.
+    reach: u32,
+    /// Least and largest coordinates of each block.
+    boxes: Vec<[[u32; 3]; 2]>,
+    /// Where in `found` a block's neighbours are, + 1; 0 while nobody has asked.
+    slots: Vec<u32>,
+    found: Vec<Back>,
+}
+
+impl Near {
+    /// Nothing is found yet. `local_bits` are the layout's: 2 to their power is about the distance of points.
+    pub(crate) fn new(layout: &PointLayout, local_bits: u32) -> Near {
+        let mut boxes = vec![[[u32::MAX; 3], [0; 3]]; layout.len().div_ceil(BLOCK)];
+        for set in layout.sets() {
+            for (point, position) in (set.first as usize..).zip(&set.positions) {
+                let [low, high] = &mut boxes[point / BLOCK];
+                for axis in 0..3 {
+                    low[axis] = low[axis].min(position[axis]);
+                    high[axis] = high[axis].max(position[axis]);
+                }
+            }
+        }
+        let slots = vec![0; boxes.len()];
+        Near { reach: 3 << local_bits, boxes, slots, found: Vec::new() }
+    }
+
+    /// The neighbours of a block's points, kept for the next time.
+    pub(crate) fn of_block(&mut self, layout: &PointLayout, block: usize) -> &Back {
+        if self.slots[block] == 0 {
+            let back = self.find(layout, block);
+            self.found.push(back);
+            self.slots[block] = self.found.len() as u32;
+        }
+        &self.found[self.slots[block] as usize - 1]
+    }
+
+    /// Bytes held, by capacity.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&self.boxes[..]) + size_of_val(&self.slots[..]) + self.found.capacity() * size_of::<Back>()
+    }
+
+    /// The neighbours of a block's points.
+    pub(crate) fn find(&self, layout: &PointLayout, block: usize) -> Back {
+        let mut back = [[0; NEIGHBOURS]; BLOCK];
+        let (start, end) = (block * BLOCK, ((block + 1) * BLOCK).min(layout.len()));
+        let sets = layout.sets();
+        let first = sets.partition_point(|set| set.first as usize + set.len() <= start);
+        for set in sets[first..].iter().take_while(|set| (set.first as usize) < end) {
+            let set_start = set.first as usize;
+            let part = start.max(set_start)..end.min(set_start + set.len());
+            if part.is_empty() {
+                continue;
+            }
+            let candidates = self.candidates(set_start, &part, &set.positions, &set.normals);
+            for point in part {
+                let at = point - set_start;
+                let own = Candidate::new(point, set.positions[at], set.normals[at]);
+                back[point - start] = own.nearest(&candidates, self.reach);
+            }
+        }
+        back
+    }
+
+    /// What may be near points `part` of a set, the last first.
+    fn candidates(
+        &self,
+        set_start: usize,
+        part: &std::ops::Range<usize>,
+        positions: &[[u32; 3]],
+        normals: &[PackedNormal],
+    ) -> Vec<Candidate> {
+        let own = &positions[part.start - set_start..part.end - set_start];
+        let mut around = [[u32::MAX; 3], [0; 3]];
+        for axis in 0..3 {
+            let along = || own.iter().map(|position| position[axis]);
+            around[0][axis] = along().min().unwrap_or(0).saturating_sub(self.reach);
+            around[1][axis] = along().max().unwrap_or(0) + self.reach;
+        }
+        let block = part.start / BLOCK;
+        let oldest = (part.end.saturating_sub(MOST_BACK).max(set_start)) / BLOCK;
+        let touches = |of: &[[u32; 3]; 2]| {
+            (0..3).all(|axis| of[0][axis] <= around[1][axis] && of[1][axis] >= around[0][axis])
+        };
+        let mut found = Vec::new();
+        for block in (oldest..=block).rev().filter(|b| touches(&self.boxes[*b])).take(BLOCKS_SEARCHED) {
+            for point in (set_start.max(block * BLOCK)..part.end.min((block + 1) * BLOCK)).rev() {
+                let position = positions[point - set_start];
+                if touches(&[position, position]) {
+                    found.push(Candidate::new(point, position, normals[point - set_start]));
+                }
+            }
+        }
+        found
+    }
+}
+
+struct Candidate {
+    point: usize,
+    position: [i32; 3],
+    normal: [i32; 3],
+}
+
+impl Candidate {
+    fn new(point: usize, position: [u32; 3], normal: PackedNormal) -> Candidate {
+        let normal = direction(normal).map(|c| c as i32);
+        Candidate { point, position: position.map(|c| c as i32), normal }
+    }
+
+    /// How far the nearest of `candidates` are back that come before this one; the list is in order, the last first.
+    /// Where there are fewer than there should be, the nearest counts for them too.
+    fn nearest(&self, candidates: &[Candidate], reach: u32) -> [u16; NEIGHBOURS] {
+        let most = u64::from(reach) * u64::from(reach);
+        let mut best = [(u64::MAX, 0u16); NEIGHBOURS];
+        let before = candidates.partition_point(|other| other.point >= self.point);
+        for other in &candidates[before..] {
+            let distance = self.distance(other);
+            let back = self.point - other.point;
+            if distance > most || distance >= best[NEIGHBOURS - 1].0 || back > MOST_BACK {
+                continue;
+            }
+            let mut at = NEIGHBOURS - 1;
+            while at > 0 && distance < best[at - 1].0 {
+                best[at] = best[at - 1];
+                at -= 1;
+            }
+            best[at] = (distance, back as u16);
+        }
+        let nearest = best[0].1;
+        best.map(|(_, back)| if back == 0 { nearest } else { back })
+    }
+
+    /// Squared distance, larger the more the normals differ; endless where they are at right angles or more.
+    fn distance(&self, other: &Candidate) -> u64 {
+        let (mut squared, mut turned, mut facing) = (0u64, 0u64, 0i32);
+        for axis in 0..3 {
+            let step = u64::from(self.position[axis].abs_diff(other.position[axis]));
+            squared += step * step;
+            let turn = u64::from(self.normal[axis].abs_diff(other.normal[axis]));
+            turned += turn * turn;
+            facing += self.normal[axis] * other.normal[axis];
+        }
+        if facing <= 0 { u64::MAX } else { squared * (ALIKE + turned) / ALIKE }
+    }
+}
