@@ -86,7 +86,7 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
     }
 
     // A store of one set of two points, then calls: random ones, and every one once.
-    let start = [5, 2, 1, 0, 0, 0, 2, 0, 1, 2, 3, 9, 1, 4, 5, 6, 9, 1, 0, 32, 100, 200];
+    let start = [5, 2, 4, 0, 1, 0, 0, 0, 2, 0, 1, 2, 3, 9, 1, 4, 5, 6, 9, 1, 0, 32, 100, 200];
     for seed in 0..6 {
         let mut random = Random(seed);
         let calls: Vec<u8> = (0..100 + 60 * seed).map(|_| random.bits() as u8).collect();

@@ -1,7 +1,7 @@
 //! Any list of calls on a publisher and its subscribers: they converge.
 
 use dapple_store::points::{Change, PointStore};
-use dapple_stream::{Applied, Frame, Limits, Publisher, PublisherConfig, Subscriber};
+use dapple_stream::{Applied, Frame, Limits, Precision, Publisher, PublisherConfig, Subscriber};
 
 use crate::input::{Input, fingerprint};
 
@@ -11,6 +11,7 @@ const MAX_CALLS: usize = 200;
 /// One publisher, one subscriber that hears everything, two that hear what the bytes choose.
 struct Session {
     publisher: Publisher,
+    tolerance: u8,
     store: PointStore,
     live: Subscriber,
     lossy: [Subscriber; 2],
@@ -24,10 +25,12 @@ pub fn session_ops(data: &[u8]) {
     let config = PublisherConfig {
         first_group: u64::from(input.byte()),
         deltas_per_group: u32::from(input.byte()) % 8,
+        precision: Precision { tolerance: input.byte() % 16, step: input.byte() % 20 },
     };
     let subscriber = Subscriber::new(Some([3; 32]), Limits::default());
     let mut session = Session {
         publisher: Publisher::new([3; 32], config),
+        tolerance: config.precision.tolerance,
         store: input.store(),
         live: subscriber.clone(),
         lossy: [subscriber.clone(), subscriber],
@@ -115,7 +118,10 @@ impl Session {
     /// `subscriber` is up to date.
     fn check(&self, subscriber: &Subscriber) {
         let held = subscriber.store().expect("it has a snapshot");
-        assert!(fingerprint(held) == fingerprint(&self.store), "the stores differ");
+        let published = self.publisher.store().expect("something is published");
+        assert!(fingerprint(held) == fingerprint(published), "the stores differ");
+        let pairs = held.visibility().iter().zip(self.store.visibility());
+        assert!(pairs.clone().all(|(a, b)| a.abs_diff(*b) <= self.tolerance), "a value is too far off");
         assert_eq!(
             (subscriber.group(), subscriber.epoch()),
             (self.publisher.group(), self.publisher.epoch())

@@ -11,13 +11,14 @@ use dapple_render::psao::{Hat, Kernel};
 use dapple_scene::PosedCamera;
 use dapple_scene::glam::Vec3;
 use dapple_server::{Progress, Server, ServerConfig};
-use dapple_stream::Limits;
+use dapple_stream::{Limits, PublisherConfig};
 use dapple_trace::Tracer;
 use dapple_trace::psao::generate::GenerateParams;
 use dapple_trace::psao::update::UpdateParams;
 use dapple_trace::rtao::{RtaoParams, trace_visibility_with_progress};
 
 use crate::args::{RenderArgs, RenderMethod, View};
+use crate::light::precision;
 use crate::exr_file::{write_gray, write_rgb};
 use crate::picture::{sites, write_png};
 use crate::progress::Bar;
@@ -190,9 +191,9 @@ fn light(args: &RenderArgs, loaded: &Loaded) -> Result<(Server, Client)> {
         update: UpdateParams {
             rays: args.visibility.point_rays,
             radius_m,
-            threshold: args.visibility.threshold,
             ..UpdateParams::default()
         },
+        publish: PublisherConfig { precision: precision(&args.visibility), ..PublisherConfig::default() },
         ..ServerConfig::default()
     };
     let bar = Bar::new("points", 1000);

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Pose, Scene};
 use dapple_store::points::PointStore;
-use dapple_stream::{Frame, PublishError, Publisher, PublisherConfig};
+use dapple_stream::{Frame, Precision, PublishError, Publisher, PublisherConfig};
 use dapple_trace::Tracer;
 use dapple_trace::psao::cuts::find_cuts;
 use dapple_trace::psao::generate::{
@@ -24,7 +24,7 @@ pub struct ServerConfig {
     pub generate: GenerateParams,
     /// How they are traced.
     pub update: UpdateParams,
-    /// How changes are grouped.
+    /// How changes are grouped, and how exactly they are sent. Its default here lets values be off by 4 of 255.
     pub publish: PublisherConfig,
     /// Whether rays find out which points must not count at which texels of a client's atlas, because something solid stands
     /// between them. Costs some seconds at the start and some bytes of each snapshot; light leaks less. Default true.
@@ -47,7 +47,7 @@ impl Default for ServerConfig {
         ServerConfig {
             generate: GenerateParams::default(),
             update: UpdateParams::default(),
-            publish: PublisherConfig::default(),
+            publish: PublisherConfig { precision: Precision { tolerance: 4, step: 0 }, ..Default::default() },
             cuts: true,
         }
     }
@@ -160,7 +160,7 @@ impl Server {
             traced: report.counts.traced(),
             rays: report.counts.rays(),
             counts: report.counts,
-            changed: report.changes.len() as u32,
+            changed: self.publisher.changed(),
         })
     }
 
@@ -174,8 +174,13 @@ impl Server {
         self.publisher.cut_bytes()
     }
 
-    /// What has been published.
+    /// What has been published: what every subscriber that is up to date holds, to the bit.
     pub fn store(&self) -> &PointStore {
+        self.publisher.store().expect("a server publishes as it starts")
+    }
+
+    /// What was traced: what has been published is nowhere farther from it than the publisher's tolerance.
+    pub fn traced(&self) -> &PointStore {
         self.updater.store()
     }
 
@@ -194,8 +199,9 @@ impl Server {
         &self.scene
     }
 
-    /// Bytes held now for each point, tracer and scene not counted ([`Updater::bytes_per_point`]).
+    /// Bytes held now for each point, tracer and scene not counted ([`Updater::bytes_per_point`], [`Publisher::bytes`]).
     pub fn bytes_per_point(&self) -> f64 {
-        self.updater.bytes_per_point()
+        let points = self.store().layout().len().max(1) as f64;
+        self.updater.bytes_per_point() + self.publisher.bytes() as f64 / points
     }
 }

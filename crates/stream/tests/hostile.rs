@@ -8,7 +8,7 @@ mod cloud;
 use std::sync::LazyLock;
 
 use dapple_store::charts::{Cuts, SetCuts, SiteCut};
-use dapple_store::points::PointStore;
+use dapple_store::points::{PackedNormal, PointLayout, PointSet, PointStore};
 use dapple_stream::codec::seal;
 use dapple_stream::{
     Applied, DecodeError, FrameHeader, FrameKind, Limits, Publisher, PublisherConfig, ReceiveError,
@@ -159,19 +159,22 @@ fn rules_of_the_format_are_enforced() {
         out.extend(values);
         Subscriber::new(None, Limits::default()).receive(&seal(FrameKind::Snapshot, 0, 0, &out))
     };
-    assert_eq!(snapshot(layout(53, 0, 0), &[2, 0]), Ok(Applied::NewLayout), "the rest would prove nothing");
+    let one = &value_of_one()[..];
+    assert_eq!(snapshot(layout(53, 0, 0), one), Ok(Applied::NewLayout), "the rest would prove nothing");
     let reason = |result: Result<Applied, ReceiveError>| result.unwrap_err().to_string();
-    assert!(reason(snapshot(layout(53, 1, 0), &[2, 0])).contains("exceed the cell"));
-    assert!(reason(snapshot(layout(0x80, 0, 0), &[2, 0])).contains("cell gaps: ends early"));
-    assert!(reason(snapshot(layout(53, 0, 0), &[2, 0, 0])).contains("bytes after"));
-    assert!(reason(snapshot(layout(53, 0, 0), &[4, 0, 0])).contains("does not fit the number of points"));
-    assert!(reason(snapshot(layout(53, 0, 0), &[2])).contains("values: ends early"));
+    assert!(reason(snapshot(layout(53, 1, 0), one)).contains("exceed the cell"));
+    assert!(reason(snapshot(layout(0x80, 0, 0), one)).contains("cell gaps: ends early"));
+    assert!(reason(snapshot(layout(53, 0, 0), &[one, &[0; 5]].concat())).contains("values: have bytes after"));
+    let mut bad = layout(53, 0, 0);
+    bad.splice(24..26, [4, 2, 2]);
+    assert!(reason(snapshot(bad, one)).contains("does not fit the number of points"));
+    assert!(reason(snapshot(layout(53, 0, 0), &[0xff; 9])).contains("values: are none"));
     let mut bad = layout(53, 0, 0);
     bad[8] = 9;
-    assert!(reason(snapshot(bad, &[2, 0])).contains("local bits"));
+    assert!(reason(snapshot(bad, one)).contains("local bits"));
     let mut bad = layout(53, 0, 0);
     bad[0..4].copy_from_slice(&f32::NAN.to_le_bytes());
-    assert!(reason(snapshot(bad, &[2, 0])).contains("quantum_m is NaN"));
+    assert!(reason(snapshot(bad, one)).contains("quantum_m is NaN"));
 
     // With 5 local bits a cell has 48 bits: the last one there is, and the first beyond.
     let with_cell = |cell: [u8; 7]| {
@@ -184,16 +187,16 @@ fn rules_of_the_format_are_enforced() {
         out
     };
     let last = [0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x3f];
-    assert_eq!(snapshot(with_cell(last), &[2, 0]), Ok(Applied::NewLayout));
+    assert_eq!(snapshot(with_cell(last), one), Ok(Applied::NewLayout));
     let beyond = [0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x40];
-    assert!(reason(snapshot(with_cell(beyond), &[2, 0])).contains("leave the 21-bit grid"));
+    assert!(reason(snapshot(with_cell(beyond), one)).contains("leave the 21-bit grid"));
 
     // One site of ten is cut.
     let with_cuts = |cuts: &[u8]| {
         let mut out = layout(53, 0, 0);
         out.truncate(out.len() - 4);
         out.extend(cuts);
-        snapshot(out, &[2, 0])
+        snapshot(out, one)
     };
     assert_eq!(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 1, 2, 9, 2, 1, 2, 0]), Ok(Applied::NewLayout));
     assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 1, 2, 10, 2, 1, 2, 0])).contains("does not exist"));
@@ -210,14 +213,31 @@ fn rules_of_the_format_are_enforced() {
     assert!(reason(with_cuts(&[&[1, 0][..], &over, &[9, 9, 9, 9, 1]].concat())).contains("exceed 32 bits"));
 
     let delta = |payload: &[u8]| holding().receive(&seal(FrameKind::Delta, 0, 12, payload));
-    assert!(matches!(delta(&[2, 1, 2, 5, 2, 9]), Ok(Applied::Changes(list)) if list.len() == 1));
-    assert!(reason(delta(&[0, 1, 2, 5, 2, 9])).contains("is the frame's own"));
-    assert!(reason(delta(&[13, 1, 2, 5, 2, 9])).contains("is negative"));
-    assert!(reason(delta(&[2, 0, 0, 0])).contains("are none"));
-    assert!(reason(delta(&[2, 1, 2, 5, 2, 0])).contains("leave a value as it was"));
-    assert!(reason(delta(&[2, 1, 2, 5, 2, 9, 0])).contains("bytes after"));
-    assert!(reason(delta(&[2, 1, 4, 5, 0, 2, 9])).contains("more than there are changes"));
-    assert!(reason(delta(&[2, 1, 8, 0xff, 0xff, 0xff, 1, 2, 9])).contains("does not exist"));
-    assert!(reason(delta(&[2, 1, 4, 0x85, 0, 2, 9])).contains("shortest form"));
-    assert!(reason(delta(&[3, 1, 2, 5, 2, 9])).contains("ask for a snapshot"));
+    let good = payload(&SAMPLE.2);
+    assert!(matches!(delta(&good), Ok(Applied::Changes(list)) if list.len() > 100));
+    let with = |at: usize, byte: u8| {
+        let mut bytes = good.clone();
+        bytes[at] = byte;
+        reason(delta(&bytes))
+    };
+    assert!(with(0, 0).contains("is the frame's own"));
+    assert!(with(0, 13).contains("is negative"));
+    assert!(with(0, 3).contains("ask for a snapshot"));
+    assert!(with(1, 0).contains("step: is 0"));
+    assert!(with(2, 129).contains("share: exceeds 2"));
+    assert!(reason(delta(&[2])).contains("step: ends early"));
+    assert!(reason(delta(&[&good[..], &[1; 5]].concat())).contains("bytes after"));
+    assert!(reason(delta(&good[..good.len() / 2])).contains("changes: end early"));
+    assert!(reason(delta(&[2, 1, 58])).contains("changes: end early"));
+    assert!(reason(delta(&[2, 1, 58, 0xff, 0xff, 0xff, 0xff])).contains("changes: are none"));
+}
+
+/// The values of a snapshot of one point.
+fn value_of_one() -> Vec<u8> {
+    let set = PointSet { positions: vec![[1, 2, 3]], normals: vec![PackedNormal([0, 0])], ..Default::default() };
+    let layout = PointLayout::new(1.0, 1.0, vec![set]).unwrap();
+    let store = PointStore::new(layout.into(), vec![77]).unwrap();
+    let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
+    let bytes = payload(&publisher.publish(&store).unwrap().unwrap().bytes);
+    bytes[33 + usize::from(bytes[32])..].to_vec()
 }

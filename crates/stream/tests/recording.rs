@@ -61,7 +61,7 @@ const STEP_US: u64 = 66_667;
 
 static SAMPLE: LazyLock<Sample> = LazyLock::new(|| {
     let mut store = cloud::hall(3, 400);
-    let config = PublisherConfig { first_group: 7, deltas_per_group: 5 };
+    let config = PublisherConfig { first_group: 7, deltas_per_group: 5, ..Default::default() };
     let mut publisher = Publisher::new(header(0).scene_hash, config);
     let (mut recorder, mut bytes) = Recorder::new(&header(24 * STEP_US)).unwrap();
     let mut states = Vec::new();

@@ -9,7 +9,7 @@ mod random;
 use common::same_bits;
 use dapple_store::points::{Change, PointStore};
 use dapple_stream::{
-    Applied, Frame, FrameKind, IgnoreReason, Limits, Publisher, PublisherConfig, ReceiveError, Subscriber,
+    Applied, Frame, FrameKind, IgnoreReason, Limits, Precision, Publisher, PublisherConfig, ReceiveError, Subscriber,
 };
 use proptest::prelude::*;
 use random::stores;
@@ -46,7 +46,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     )
 }
 
-/// All that a run of a publisher shows: its state after each step, its frames, and what a joiner would be given.
+/// All that a run of a publisher shows: what it says that subscribers hold after each step, its frames, and what a joiner would be given.
 struct Run {
     states: Vec<PointStore>,
     frames: Vec<Vec<Frame>>,
@@ -77,7 +77,11 @@ fn run(start: &PointStore, steps: &[Step], config: PublisherConfig) -> Run {
         if matches!(step, Step::Still) && index > 0 {
             assert!(frames.is_empty(), "a still scene sends nothing");
         }
-        run.states.push(store.clone());
+        let held = publisher.store().expect("something is published");
+        let tolerance = config.precision.tolerance;
+        assert!(held.visibility().iter().zip(store.visibility()).all(|(a, b)| a.abs_diff(*b) <= tolerance));
+        assert!(tolerance > 0 || same_bits(held, &store));
+        run.states.push(held.clone());
         run.frames.push(frames);
         run.joins.push(publisher.join().unwrap().expect("something is published"));
     }
@@ -85,8 +89,15 @@ fn run(start: &PointStore, steps: &[Step], config: PublisherConfig) -> Run {
 }
 
 fn config() -> impl Strategy<Value = PublisherConfig> {
-    (prop_oneof![Just(0u64), 1u64 << 40..1 << 41], 0u32..5)
-        .prop_map(|(first_group, deltas_per_group)| PublisherConfig { first_group, deltas_per_group })
+    let precision = prop_oneof![Just((0u8, 0u8)), Just((4, 0)), (0u8..=127, any::<u8>())];
+    let precision = precision.prop_map(|(tolerance, step)| Precision { tolerance, step });
+    (prop_oneof![Just(0u64), 1u64 << 40..1 << 41], 0u32..5, precision).prop_map(
+        |(first_group, deltas_per_group, precision)| PublisherConfig {
+            first_group,
+            deltas_per_group,
+            precision,
+        },
+    )
 }
 
 proptest! {
@@ -233,7 +244,7 @@ fn a_delta_of_one_change_is_tens_of_bytes() {
 #[test]
 fn a_gap_is_named_and_a_new_group_of_the_same_layout_is_only_changes() {
     let mut store = small();
-    let mut publisher = Publisher::new(SCENE, PublisherConfig { first_group: 5, deltas_per_group: 0 });
+    let mut publisher = Publisher::new(SCENE, PublisherConfig { first_group: 5, ..Default::default() });
     let mut receiver = subscriber();
     let first = publisher.publish(&store).unwrap().unwrap();
     store.apply(&[Change { point: 0, visibility: 1 }]).unwrap();

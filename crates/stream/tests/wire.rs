@@ -79,7 +79,7 @@ fn the_vectors_decode_to_what_is_described() {
 
 #[test]
 fn encoding_gives_the_vectors() {
-    let config = PublisherConfig { first_group: 300, deltas_per_group: 0 };
+    let config = PublisherConfig { first_group: 300, ..Default::default() };
     let mut publisher = Publisher::new(scene_hash(), config);
     let mut store = described();
     publisher.set_cuts(store.layout().clone(), cuts());

@@ -230,7 +230,6 @@ impl Run<'_> {
             let update = UpdateParams {
                 rays: visibility.point_rays,
                 radius_m,
-                threshold: visibility.threshold,
                 ..UpdateParams::default()
             };
             let updater = Updater::new(scene, &pose, &tracer, points, update, &|_| ())?;

@@ -205,7 +205,7 @@ fn decode_sets(reader: &mut Reader<'_>, limits: &Limits) -> Result<(Vec<PointSet
 pub(crate) fn decode_values(bytes: &[u8], layout: &PointLayout, near: &Near) -> Result<Vec<u8>, DecodeError> {
     let bad = |reason| DecodeError::Malformed { part: "values", reason };
     let mut reader = entropy::Reader::new(bytes);
-    let values = code_values(&mut reader, layout, near, |_| 0).ok_or(bad("end early"))?;
+    let values = code_values(&mut reader, layout, near, |_| 0).map_err(bad)?;
     if !reader.is_complete() {
         return Err(bad("have bytes after their end"));
     }

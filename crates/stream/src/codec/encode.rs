@@ -115,7 +115,8 @@ pub(crate) fn snapshot_payload(
     write_varint(&mut out, encoded.bytes.len() as u64);
     out.extend(&encoded.bytes);
     let mut writer = Writer::new(out);
-    code_values(&mut writer, layout, near, |point| visibility[point]);
+    code_values(&mut writer, layout, near, |point| visibility[point])
+        .expect("only reading fails");
     writer.finish()
 }
 

@@ -16,14 +16,14 @@ struct Chances {
     size: [Number; 10],
 }
 
-/// Codes the values of all points; `wanted` are those to write, and are ignored by a reader. Gives what was coded, or nothing
-/// if the bytes of a reader ended too early.
+/// Codes the values of all points; `wanted` are those to write, and are ignored by a reader. Gives what was coded, or says
+/// what is wrong with the bytes of a reader.
 pub(crate) fn code_values<C: Coder>(
     coder: &mut C,
     layout: &PointLayout,
     near: &Near,
     wanted: impl Fn(usize) -> u8,
-) -> Option<Vec<u8>> {
+) -> Result<Vec<u8>, &'static str> {
     let points = layout.len();
     let mut occurs = [false; 256];
     (0..points).for_each(|point| occurs[usize::from(wanted(point))] = true);
@@ -34,7 +34,7 @@ pub(crate) fn code_values<C: Coder>(
         size: [Number::default(); 10],
     };
     if points == 0 {
-        return Some(Vec::new());
+        return Ok(Vec::new());
     }
     // The values that occur in order, and the place of each among them.
     let (mut palette, mut places, mut flags) = (Vec::new(), [0u8; 256], 0);
@@ -46,10 +46,11 @@ pub(crate) fn code_values<C: Coder>(
             palette.push(value);
         }
     }
-    let top = i32::try_from(palette.len()).ok()? - 1;
-    if top < 0 {
-        return None;
-    }
+    let top = match palette[..] {
+        [] => return Err("are none"),
+        [only] => return Ok(vec![only; points]),
+        _ => palette.len() as i32 - 1,
+    };
     let mut coded: Vec<u8> = Vec::new();
     for start in (0..points).step_by(BLOCK) {
         let back = near.find(layout, start / BLOCK);
@@ -63,11 +64,11 @@ pub(crate) fn code_values<C: Coder>(
             coded.push(place as u8);
         }
         if coder.is_exhausted() {
-            return None;
+            return Err("end early");
         }
     }
     coded.iter_mut().for_each(|place| *place = palette[usize::from(*place)]);
-    Some(coded)
+    Ok(coded)
 }
 
 impl Chances {
@@ -77,7 +78,7 @@ impl Chances {
         let spread: i32 = SHARES.iter().zip(neighbours).map(|(share, v)| share * (v - expected).abs()).sum();
         let kind = [1, 3, 6, 10, 16, 24, 36, 56, 90].iter().filter(|limit| spread >= **limit).count();
         let edge = if expected == top { 2 } else { usize::from(expected == 0) };
-        if top == 0 || !coder.bit(&mut self.some[kind][edge], wanted != expected) {
+        if !coder.bit(&mut self.some[kind][edge], wanted != expected) {
             return expected;
         }
         let falls = match expected {
