@@ -21,7 +21,7 @@ pub(crate) use decode::{DecodedLayout, decode_changes, decode_layout, decode_val
 pub(crate) use encode::{EncodedLayout, delta_payload, encode_layout, snapshot_payload};
 pub(crate) use frame::open;
 pub use frame::{FrameHeader, FrameKind, MAGIC, VERSION, seal};
-pub use values::ValueChange;
+pub use values::{ValueChange, first_chances};
 #[cfg(feature = "zstd")]
 pub(crate) use values::{Fit, Goal};
 pub(crate) use values::{Near, Scratch};

@@ -13,3 +13,4 @@ pub(crate) use delta::{Guide, MOST_FOLLOW, Scale, Scratch, code_changes};
 pub(crate) use goal::{Fit, Goal};
 pub(crate) use near::Near;
 pub(crate) use snapshot::code_values;
+pub use start::first_chances;

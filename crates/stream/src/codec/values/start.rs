@@ -34,6 +34,12 @@ impl Chances {
     };
 }
 
+/// The numbers that `docs/wire.md` lists, in its order: where the chances of a delta begin, in 256ths.
+pub fn first_chances() -> Vec<u8> {
+    let flat = SIZE.as_flattened();
+    [&STRETCHES[..], &LEAVES, &SOME, &AGAINST, flat].concat()
+}
+
 const fn chances<const N: usize>(shares: [u8; N]) -> [Chance; N] {
     let mut out = [Chance::EVEN; N];
     let mut at = 0;
