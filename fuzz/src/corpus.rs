@@ -43,7 +43,7 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
         seeds.push(("decode_frame", format!("{name}-payload"), [&[kind], payload].concat()));
     };
     let publish = |publisher: &mut Publisher, store: &PointStore| {
-        publisher.publish(store).expect("memory suffices").expect("a change")
+        publisher.publish(store).expect("a change")
     };
     let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
     let mut store = sample();

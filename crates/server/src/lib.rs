@@ -9,7 +9,7 @@ use std::sync::Arc;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Pose, Scene};
 use dapple_store::points::PointStore;
-use dapple_stream::{Frame, Precision, PublishError, Publisher, PublisherConfig};
+use dapple_stream::{Frame, Precision, Publisher, PublisherConfig};
 use dapple_trace::Tracer;
 use dapple_trace::psao::cuts::find_cuts;
 use dapple_trace::psao::generate::{
@@ -73,9 +73,6 @@ pub enum ServerError {
     /// Settings of the update are out of range.
     #[error(transparent)]
     Update(#[from] UpdateError),
-    /// The changes could not be published.
-    #[error(transparent)]
-    Publish(#[from] PublishError),
 }
 
 /// What one step did.
@@ -138,7 +135,7 @@ impl Server {
                 find_cuts(&scene, &pose, &tracer, layout, &|done| progress(Progress::Cutting(done, sets)));
             publisher.set_cuts(layout.clone(), cuts);
         }
-        publisher.publish(updater.store())?;
+        publisher.publish(updater.store());
         Ok(Server { scene, tracer, updater, publisher, dropped_inside })
     }
 
@@ -154,7 +151,7 @@ impl Server {
         let pose = self.scene.pose(now_s);
         self.tracer.update(&self.scene, &pose);
         let report = self.updater.step(&self.scene, &pose, &mut self.tracer, input);
-        let frame = self.publisher.publish(self.updater.store())?;
+        let frame = self.publisher.publish(self.updater.store());
         Ok(StepReport {
             frame,
             traced: report.counts.traced(),
@@ -166,7 +163,7 @@ impl Server {
 
     /// The snapshot that brings a subscriber that joins now up to date. Encoded at most once an update.
     pub fn join(&mut self) -> Result<Option<Frame>, ServerError> {
-        Ok(self.publisher.join()?)
+        Ok(self.publisher.join())
     }
 
     /// How many bytes of a snapshot are cuts.

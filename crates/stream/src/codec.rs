@@ -6,23 +6,23 @@
 //! the cuts: which points do not count at which texels. Values, and what changed of them, are foretold from neighbours and
 //! written by an entropy coder (`values/`, `entropy/`); a delta builds on the values the receiver holds and on nothing else.
 
+mod columns;
 mod decode;
-#[cfg(feature = "zstd")]
+#[cfg(feature = "publish")]
 mod encode;
 mod entropy;
 mod frame;
 mod plane;
-mod section;
 mod values;
 mod varint;
 
 pub(crate) use decode::{DecodedLayout, decode_changes, decode_layout, decode_values, parse_delta, parse_snapshot};
-#[cfg(feature = "zstd")]
+#[cfg(feature = "publish")]
 pub(crate) use encode::{EncodedLayout, delta_payload, encode_layout, snapshot_payload};
 pub(crate) use frame::open;
 pub use frame::{FrameHeader, FrameKind, MAGIC, VERSION, seal};
 pub use values::{ValueChange, first_chances};
-#[cfg(feature = "zstd")]
+#[cfg(feature = "publish")]
 pub(crate) use values::{Fit, Goal};
 pub(crate) use values::{Near, Scratch};
 
@@ -115,11 +115,7 @@ pub enum DecodeError {
     Layout(#[from] LayoutError),
 }
 
-/// The start of every Zstandard frame, which sections leave out.
-const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
-
 /// Maps small differences of either sign, modulo 256, to small bytes.
-#[cfg(feature = "zstd")]
 fn zigzag(difference: u8) -> u8 {
     let d = difference as i8;
     ((d << 1) ^ (d >> 7)) as u8

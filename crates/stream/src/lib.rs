@@ -1,6 +1,6 @@
 //! Changes of a store ⇄ frames of bytes, blind to transport: no sockets, clock or threads in here.
 //!
-//! A [`Publisher`] (feature `zstd`) turns the states of a [`PointStore`](dapple_store::points::PointStore) into
+//! A [`Publisher`] (feature `publish`) turns the states of a [`PointStore`](dapple_store::points::PointStore) into
 //! [`Frame`]s; a [`Subscriber`] turns any bytes back into the same store, bit for bit, or names what is wrong
 //! with them. The frames are specified in `docs/wire.md`; [`codec`] is the bits, [`session`] the order. Frames kept
 //! in a file are a [`recording`].
@@ -17,5 +17,5 @@ pub mod session;
 pub use codec::{DecodeError, FrameHeader, FrameKind, Limits, ValueChange};
 pub use recording::{Recorder, Recording, RecordingError, RecordingHeader, Replay};
 pub use session::{Applied, IgnoreReason, ReceiveError, Subscriber};
-#[cfg(feature = "zstd")]
-pub use session::{Frame, Precision, PublishError, Publisher, PublisherConfig};
+#[cfg(feature = "publish")]
+pub use session::{Frame, Precision, Publisher, PublisherConfig};

@@ -71,7 +71,7 @@ static SAMPLE: LazyLock<Sample> = LazyLock::new(|| {
             store = cloud::moved(&store, step, 0.05);
         }
         let time_us = step * STEP_US;
-        if let Some(frame) = publisher.publish(&store).unwrap() {
+        if let Some(frame) = publisher.publish(&store) {
             bytes.extend(recorder.frame(time_us, &frame.bytes).unwrap());
             states.push((time_us, store.clone()));
         }

@@ -91,14 +91,14 @@ fn encoding_gives_the_vectors() {
     publisher.set_cuts(store.layout().clone(), cuts());
     // Epochs 0 to 4 show other values; a joiner at epoch 5 gets the snapshot.
     for value in 0..5 {
-        publisher.publish(&PointStore::new(store.layout().clone(), vec![value; 5]).unwrap()).unwrap();
+        publisher.publish(&PointStore::new(store.layout().clone(), vec![value; 5]).unwrap());
     }
-    publisher.publish(&store).unwrap();
-    let snapshot = publisher.join().unwrap().unwrap();
+    publisher.publish(&store);
+    let snapshot = publisher.join().unwrap();
     assert_eq!(hex(&vector("snapshot")), hex(&snapshot.bytes));
-    assert!(publisher.publish(&store).unwrap().is_none());
+    assert!(publisher.publish(&store).is_none());
     store.apply(&changes()).unwrap();
-    let delta = publisher.publish(&store).unwrap().unwrap();
+    let delta = publisher.publish(&store).unwrap();
     assert_eq!(hex(&vector("delta")), hex(&delta.bytes));
 }
 
@@ -110,11 +110,11 @@ fn the_row_vector_decodes() {
     let mut store = PointStore::new(layout.into(), vec![0; 64]).unwrap();
     let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
     let mut subscriber = Subscriber::new(None, Limits::default());
-    subscriber.receive(&publisher.publish(&store).unwrap().unwrap().bytes).unwrap();
+    subscriber.receive(&publisher.publish(&store).unwrap().bytes).unwrap();
     let bytes = vector("row");
     let applied = subscriber.receive(&bytes);
     store = PointStore::new(store.layout().clone(), vec![1; 64]).unwrap();
-    let own = publisher.publish(&store).unwrap().unwrap();
+    let own = publisher.publish(&store).unwrap();
     assert!(matches!(applied, Ok(Applied::Changes(list)) if list.len() == 64), "ours: {}", hex(&own.bytes));
     assert!(common::same_bits(subscriber.store().unwrap(), &store));
     let header = FrameHeader::parse(&bytes, &Limits::default()).unwrap();

@@ -118,7 +118,7 @@ fn measure(name: &str, scene: &Scene, arguments: &Arguments) -> Result<Value> {
     let params = UpdateParams::default();
     let mut updater = Updater::new(scene, &pose, &tracer, points, params, &|_| ())?;
     let mut publisher = Publisher::new([0; 32], ServerConfig::default().publish);
-    publisher.publish(updater.store())?;
+    publisher.publish(updater.store());
 
     let mut steps = Vec::new();
     for step in 1..=arguments.steps {
@@ -136,7 +136,7 @@ fn measure(name: &str, scene: &Scene, arguments: &Arguments) -> Result<Value> {
             traced: report.counts.traced(),
             rays: report.counts.rays(),
             changed: publisher.changed() as usize,
-            bytes: frame?.map_or(0, |frame| frame.bytes.len()),
+            bytes: frame.map_or(0, |frame| frame.bytes.len()),
         });
     }
     let bytes = updater.bytes_per_point();

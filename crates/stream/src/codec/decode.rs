@@ -1,21 +1,14 @@
 //! Payloads → layouts, values and changes. Total: any bytes give a value or an error, within [`Limits`].
 
 use dapple_store::charts::{Cuts, SetCuts, SiteCut};
-use dapple_store::points::{MAX_POINTS, PackedNormal, PointLayout, PointSet, morton_decode};
+use dapple_store::points::{MAX_POINTS, PointLayout, PointSet};
 use glam::Vec3;
 
-use super::plane::{Plane, reference};
-use super::section::unpack;
-use super::entropy;
+use super::columns::{CutColumns, PointColumns};
+use super::entropy::{self, Coder};
 use super::values::{Guide, MOST_FOLLOW, Near, Scale, Scratch, ValueChange, code_changes, code_values};
 use super::varint::Reader;
-use super::{DecodeError, Limits, unzigzag};
-
-/// Most bytes of a varint below 2⁶³.
-const MAX_GAP_BYTES: usize = 9;
-
-/// Most bytes of a varint below 2³².
-const MAX_SITE_GAP_BYTES: usize = 5;
+use super::{DecodeError, Limits};
 
 /// The parts of a snapshot, the large ones still encoded.
 pub(crate) struct SnapshotParts<'a> {
@@ -57,63 +50,59 @@ pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<DecodedLayo
         return Err(bad("layout local bits", "exceed 8"));
     }
     let (mut sets, counts) = decode_sets(&mut reader, limits)?;
-    let total: usize = counts.iter().sum();
-
-    let normals_x = unpack(&mut reader, "normals", total, total)?;
-    let normals_y = unpack(&mut reader, "normals", total, total)?;
-    let cell_gaps = unpack(&mut reader, "cell gaps", total, MAX_GAP_BYTES * total)?;
-    let along_0 = unpack(&mut reader, "coordinates", total, total)?;
-    let along_1 = unpack(&mut reader, "coordinates", total, total)?;
-    let across = unpack(&mut reader, "coordinates", total, total)?;
-    let cuts = decode_cuts(&mut reader, limits)?;
-    if !reader.is_empty() {
-        return Err(bad("layout", "has bytes after its last section"));
-    }
-    let local_mask = (1u32 << local_bits) - 1;
-    if [&along_0, &along_1, &across].into_iter().flatten().any(|&c| u32::from(c) > local_mask) {
-        return Err(bad("coordinates", "exceed the cell"));
-    }
-
-    let mut gaps = Reader::new(&cell_gaps);
-    let mut first = 0;
+    let (mut cut_sets, cut_counts) = decode_cut_sets(&mut reader, limits)?;
+    // No more room is made than these bytes can well fill.
+    let most = 8 * reader.len() + 64;
+    let mut coded = entropy::Reader::new(reader.take(reader.len(), "layout")?);
+    let ended = bad("layout", "ends early");
+    let mut columns = PointColumns::new(local_bits);
     for (set, count) in sets.iter_mut().zip(counts) {
-        set.normals = Vec::with_capacity(count);
-        set.positions = Vec::with_capacity(count);
-        let mut normal = [0u8; 2];
-        for i in first..first + count {
-            normal[0] = normal[0].wrapping_add(unzigzag(normals_x[i]));
-            normal[1] = normal[1].wrapping_add(unzigzag(normals_y[i]));
-            set.normals.push(PackedNormal(normal));
-        }
-        let mut cell = 0u64;
-        for i in 0..count {
-            cell = gaps
-                .varint("cell gaps")?
-                .checked_add(cell)
-                .filter(|&cell| cell < 1 << (63 - 3 * local_bits))
-                .ok_or(bad("cell gaps", "leave the 21-bit grid"))?;
-            let corner = morton_decode(cell << (3 * local_bits));
-            let plane = Plane::new(set.normals[i]);
-            let at = first + i;
-            let mut position = corner;
-            position[plane.along[0]] |= u32::from(along_0[at]);
-            position[plane.along[1]] |= u32::from(along_1[at]);
-            let along = plane.along.map(|axis| position[axis]);
-            let predicted = plane.predict(reference(&set.positions, &set.normals, i), along);
-            position[plane.across] |= predicted.wrapping_add(u32::from(across[at])) & local_mask;
+        set.positions = Vec::with_capacity(count.min(most));
+        set.normals = Vec::with_capacity(count.min(most));
+        columns.begin_set();
+        for _ in 0..count {
+            let before = (&set.positions[..], &set.normals[..]);
+            let (position, normal) = columns
+                .code(&mut coded, before, None)
+                .map_err(|(part, reason)| if coded.is_exhausted() { ended.clone() } else { bad(part, reason) })?;
+            if coded.is_exhausted() {
+                return Err(ended);
+            }
             set.positions.push(position);
+            set.normals.push(normal);
         }
-        first += count;
+        set.positions.shrink_to_fit();
+        set.normals.shrink_to_fit();
     }
-    if !gaps.is_empty() {
-        return Err(bad("cell gaps", "are more than there are points"));
+    let mut columns = CutColumns::new();
+    for (set, count) in cut_sets.iter_mut().zip(cut_counts) {
+        columns.begin_set();
+        set.cuts = Vec::with_capacity(count.min(most));
+        for _ in 0..count {
+            let cut = columns
+                .code(&mut coded, SiteCut { site: 0, mask: 0 })
+                .map_err(|(part, reason)| if coded.is_exhausted() { ended.clone() } else { bad(part, reason) })?;
+            if coded.is_exhausted() {
+                return Err(ended);
+            }
+            if cut.site >= set.sites {
+                return Err(bad("cut gaps", "name a site that does not exist"));
+            }
+            set.cuts.push(cut);
+        }
+        set.cuts.shrink_to_fit();
     }
+    if !coded.is_complete() {
+        return Err(bad("layout", "has bytes after its end"));
+    }
+    // A mask of 0 is found here.
+    let cuts = Cuts::new(cut_sets).map_err(|error| bad("cut masks", error.reason))?;
     let layout = PointLayout::new(quantum_m, spacing_m, sets)?;
     Ok(DecodedLayout { layout, cuts, local_bits })
 }
 
-/// The cuts that close a layout.
-fn decode_cuts(reader: &mut Reader<'_>, limits: &Limits) -> Result<Cuts, DecodeError> {
+/// The table of sets of cuts, still without cuts, and how many each has: together within the limits.
+fn decode_cut_sets(reader: &mut Reader<'_>, limits: &Limits) -> Result<(Vec<SetCuts>, Vec<usize>), DecodeError> {
     let part = "cuts";
     let bad = |reason| DecodeError::Malformed { part, reason };
     let count = reader.varint(part)?;
@@ -145,31 +134,7 @@ fn decode_cuts(reader: &mut Reader<'_>, limits: &Limits) -> Result<Cuts, DecodeE
         counts.push(cuts as usize);
         sets.push(SetCuts { instance, sites, fingerprint, cuts: Vec::new() });
     }
-    let total = total as usize;
-    let gaps = unpack(reader, "cut gaps", total, MAX_SITE_GAP_BYTES * total)?;
-    let low = unpack(reader, "cut masks", total, total)?;
-    let high = unpack(reader, "cut masks", total, total)?;
-    let mut gaps = Reader::new(&gaps);
-    let mut masks = low.iter().zip(&high).map(|(&low, &high)| u16::from_le_bytes([low, high]));
-    for (set, count) in sets.iter_mut().zip(counts) {
-        set.cuts = Vec::with_capacity(count);
-        let mut next = 0u64;
-        for mask in masks.by_ref().take(count) {
-            let site = next.saturating_add(gaps.varint("cut gaps")?);
-            if site >= u64::from(set.sites) {
-                return Err(DecodeError::Malformed {
-                    part: "cut gaps",
-                    reason: "name a site that does not exist",
-                });
-            }
-            next = site + 1;
-            set.cuts.push(SiteCut { site: site as u32, mask });
-        }
-    }
-    if !gaps.is_empty() {
-        return Err(DecodeError::Malformed { part: "cut gaps", reason: "are more than there are cuts" });
-    }
-    Cuts::new(sets).map_err(|error| bad(error.reason))
+    Ok((sets, counts))
 }
 
 /// The table of sets, still without points, and how many points each has: together within the limits.

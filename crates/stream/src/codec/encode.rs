@@ -1,17 +1,12 @@
 //! Stores and changes → payloads. Deterministic: the same input gives the same bytes.
 
 use dapple_store::charts::Cuts;
-use dapple_store::points::{PointLayout, morton_code};
+use dapple_store::points::PointLayout;
 
-use super::plane::{Plane, reference};
+use super::columns::{CutColumns, PointColumns};
 use super::entropy::Writer;
-use super::section::pack;
 use super::values::{Fit, Goal, Near, Scratch, ValueChange, code_changes, code_values};
 use super::varint::write_varint;
-use super::zigzag;
-
-/// Zstandard level of the layout: made once, sent to everyone.
-const LAYOUT_LEVEL: i32 = 15;
 
 /// Most bits of a coordinate within its cell: they are coded as one byte.
 const MAX_LOCAL_BITS: u32 = 8;
@@ -26,18 +21,15 @@ pub(crate) struct EncodedLayout {
     pub(crate) local_bits: u32,
 }
 
-pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts) -> Result<EncodedLayout, std::io::Error> {
+/// The layout part of a snapshot.
+pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts) -> EncodedLayout {
     let local_bits = local_bits(layout);
-    let local_mask = (1u32 << local_bits) - 1;
     let mut out = Vec::new();
     out.extend(layout.quantum_m().to_le_bytes());
     out.extend(layout.spacing_m().to_le_bytes());
     out.push(local_bits as u8);
     write_varint(&mut out, layout.sets().len() as u64);
     let mut next_instance = 0;
-    let mut normals = [Vec::new(), Vec::new()];
-    let mut cell_gaps = Vec::new();
-    let mut locals = [Vec::new(), Vec::new(), Vec::new()];
     for set in layout.sets() {
         write_varint(&mut out, u64::from(set.instance) - next_instance);
         next_instance = u64::from(set.instance) + 1;
@@ -45,62 +37,40 @@ pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts) -> Result<Encoded
             out.extend(component.to_le_bytes());
         }
         write_varint(&mut out, set.len() as u64);
-        let mut last_normal = [0u8; 2];
-        let mut last_cell = 0;
-        for (i, (&position, &normal)) in set.positions.iter().zip(&set.normals).enumerate() {
-            for axis in 0..2 {
-                normals[axis].push(zigzag(normal.0[axis].wrapping_sub(last_normal[axis])));
-            }
-            last_normal = normal.0;
-            let cell = morton_code(position) >> (3 * local_bits);
-            write_varint(&mut cell_gaps, cell - last_cell);
-            last_cell = cell;
-            let plane = Plane::new(normal);
-            let along = plane.along.map(|axis| position[axis]);
-            let predicted = plane.predict(reference(&set.positions, &set.normals, i), along);
-            let across = position[plane.across].wrapping_sub(predicted);
-            for (column, value) in locals.iter_mut().zip([along[0], along[1], across]) {
-                column.push((value & local_mask) as u8);
-            }
-        }
     }
-    let [n0, n1] = &normals;
-    let [l0, l1, l2] = &locals;
-    for section in [n0, n1, &cell_gaps, l0, l1, l2] {
-        pack(&mut out, section, LAYOUT_LEVEL)?;
-    }
-    let without_cuts = out.len();
-    encode_cuts(&mut out, cuts)?;
-    let cut_bytes = out.len() - without_cuts;
-    Ok(EncodedLayout { bytes: out, cut_bytes, local_bits })
-}
-
-fn encode_cuts(out: &mut Vec<u8>, cuts: &Cuts) -> Result<(), std::io::Error> {
-    let sets = || cuts.sets().iter().filter(|set| !set.cuts.is_empty());
-    write_varint(out, sets().count() as u64);
+    let cut_sets: Vec<_> = cuts.sets().iter().filter(|set| !set.cuts.is_empty()).collect();
+    let before_cuts = out.len();
+    write_varint(&mut out, cut_sets.len() as u64);
     let mut next_instance = 0;
-    let mut gaps = Vec::new();
-    let mut masks = [Vec::new(), Vec::new()];
-    for set in sets() {
-        write_varint(out, u64::from(set.instance) - next_instance);
+    for set in &cut_sets {
+        write_varint(&mut out, u64::from(set.instance) - next_instance);
         next_instance = u64::from(set.instance) + 1;
-        write_varint(out, u64::from(set.sites));
+        write_varint(&mut out, u64::from(set.sites));
         out.extend(set.fingerprint.to_le_bytes());
-        write_varint(out, set.cuts.len() as u64);
-        let mut next = 0;
-        for cut in &set.cuts {
-            write_varint(&mut gaps, u64::from(cut.site - next));
-            next = cut.site + 1;
-            for (column, byte) in masks.iter_mut().zip(cut.mask.to_le_bytes()) {
-                column.push(byte);
-            }
+        write_varint(&mut out, set.cuts.len() as u64);
+    }
+    let table_bytes = out.len() - before_cuts;
+    let mut writer = Writer::new(out);
+    let mut columns = PointColumns::new(local_bits);
+    for set in layout.sets() {
+        columns.begin_set();
+        for i in 0..set.len() {
+            let (positions, normals) = (&set.positions, &set.normals);
+            let place = Some((positions[i], normals[i]));
+            columns.code(&mut writer, (&positions[..i], &normals[..i]), place).expect("only reading fails");
         }
     }
-    let [low, high] = &masks;
-    for section in [&gaps, low, high] {
-        pack(out, section, LAYOUT_LEVEL)?;
+    let before_cuts = writer.bytes();
+    let mut columns = CutColumns::new();
+    for set in cut_sets {
+        columns.begin_set();
+        for cut in &set.cuts {
+            columns.code(&mut writer, *cut).expect("only reading fails");
+        }
     }
-    Ok(())
+    let bytes = writer.finish();
+    let cut_bytes = table_bytes + bytes.len().saturating_sub(before_cuts);
+    EncodedLayout { bytes, cut_bytes, local_bits }
 }
 
 /// The payload of a snapshot; `encoded` is what [`encode_layout`] gave for `layout`, `visibility` one value a point.

@@ -29,10 +29,6 @@ impl<'a> Reader<'a> {
         self.rest.len()
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
-        self.rest.is_empty()
-    }
-
     pub(crate) fn take(&mut self, count: usize, part: &'static str) -> Result<&'a [u8], DecodeError> {
         let (taken, rest) =
             self.rest.split_at_checked(count).ok_or(DecodeError::Malformed { part, reason: "ends early" })?;
@@ -88,7 +84,7 @@ mod tests {
             write_varint(&mut bytes, value >> shift);
             let mut reader = Reader::new(&bytes);
             prop_assert_eq!(reader.varint("test").unwrap(), value >> shift);
-            prop_assert!(reader.is_empty());
+            prop_assert_eq!(reader.len(), 0);
         }
     }
 

@@ -57,14 +57,6 @@ pub struct Frame {
     pub bytes: Arc<[u8]>,
 }
 
-/// Why a state could not be published.
-#[derive(Debug, thiserror::Error)]
-pub enum PublishError {
-    /// The compressor failed, which means that memory ran out.
-    #[error("publish: compression failed: {0}; free memory and publish again")]
-    Compress(#[from] std::io::Error),
-}
-
 /// The sending end: takes the state of each epoch, gives the frame that carries subscribers there.
 ///
 /// It keeps what subscribers hold, some bytes a point to find out how to say what changed, and the encoded layout, and never an older state: a
@@ -124,8 +116,7 @@ impl Publisher {
     ///
     /// What changed is found here, by comparison with what subscribers hold, which [`Publisher::store`] then is. The frame is a
     /// delta, or a snapshot where a group starts: at first, with a new layout, and as [`PublisherConfig::deltas_per_group`] says.
-    /// On an error nothing has happened.
-    pub fn publish(&mut self, store: &PointStore) -> Result<Option<Frame>, PublishError> {
+    pub fn publish(&mut self, store: &PointStore) -> Option<Frame> {
         let epoch = self.next_epoch;
         let (frame, changed) = match &mut self.state {
             Some(state) if same_layout(state.store.layout(), store.layout()) => {
@@ -148,7 +139,7 @@ impl Publisher {
             old => {
                 let given = self.cuts.as_ref().filter(|(layout, _)| same_layout(layout, store.layout()));
                 let none = Cuts::default();
-                let encoded = encode_layout(store.layout(), given.map_or(&none, |(_, cuts)| cuts))?;
+                let encoded = encode_layout(store.layout(), given.map_or(&none, |(_, cuts)| cuts));
                 let group =
                     old.as_ref().map_or(self.config.first_group.min(u64::MAX >> 1), |state| state.group + 1);
                 let state = State {
@@ -169,7 +160,7 @@ impl Publisher {
             }
         };
         (self.next_epoch, self.changed) = (epoch + 1, changed as u32);
-        Ok(frame)
+        frame
     }
 
     /// What subscribers that are up to date hold, to the bit. `None` before the first [`Publisher::publish`].
@@ -195,20 +186,14 @@ impl Publisher {
 
     /// What a subscriber that joins now, or fell behind, needs: one snapshot of the present state, after which
     /// it is up to date. `None` before the first [`Publisher::publish`].
-    pub fn join(&self) -> Result<Option<Frame>, PublishError> {
-        match &self.state {
-            Some(state) => Ok(Some(state.snapshot(&self.scene_hash))),
-            None => Ok(None),
-        }
+    pub fn join(&self) -> Option<Frame> {
+        self.state.as_ref().map(|state| state.snapshot(&self.scene_hash))
     }
 
     /// Starts a new group with the present state; its snapshot is for everyone. `None` before the first
     /// [`Publisher::publish`].
-    pub fn start_group(&mut self) -> Result<Option<Frame>, PublishError> {
-        match &mut self.state {
-            Some(state) => Ok(Some(state.start_group(state.epoch, &self.scene_hash))),
-            None => Ok(None),
-        }
+    pub fn start_group(&mut self) -> Option<Frame> {
+        self.state.as_mut().map(|state| state.start_group(state.epoch, &self.scene_hash))
     }
 
     /// The group that subscribers that are up to date are in.

@@ -4,6 +4,6 @@ mod number;
 mod range;
 
 pub(crate) use number::Number;
-#[cfg(feature = "zstd")]
+#[cfg(feature = "publish")]
 pub(crate) use range::Writer;
 pub(crate) use range::{Chance, Coder, Reader};

@@ -65,7 +65,7 @@ pub(crate) trait Coder {
 }
 
 /// The writing end.
-#[cfg(feature = "zstd")]
+#[cfg(feature = "publish")]
 #[derive(Debug)]
 pub(crate) struct Writer {
     /// Where the range begins; bit 32 is a carry into bytes that are out already.
@@ -79,11 +79,16 @@ pub(crate) struct Writer {
     out: Vec<u8>,
 }
 
-#[cfg(feature = "zstd")]
+#[cfg(feature = "publish")]
 impl Writer {
     /// Appends to `out`.
     pub(crate) fn new(out: Vec<u8>) -> Writer {
         Writer { low: 0, range: u32::MAX, held: 0, full: 0, first: true, out }
+    }
+
+    /// Bytes that are certain so far.
+    pub(crate) fn bytes(&self) -> usize {
+        self.out.len()
     }
 
     fn shift(&mut self) {
@@ -119,7 +124,7 @@ impl Writer {
     }
 }
 
-#[cfg(feature = "zstd")]
+#[cfg(feature = "publish")]
 impl Coder for Writer {
     fn bit(&mut self, chance: &mut Chance, one: bool) -> bool {
         let bound = (self.range >> 16) * chance.of_one();

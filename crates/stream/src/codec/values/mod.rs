@@ -1,7 +1,7 @@
 //! Values of points ⇄ choices: foretold from neighbours, and what is left as few small numbers.
 
 mod delta;
-#[cfg(feature = "zstd")]
+#[cfg(feature = "publish")]
 mod goal;
 mod near;
 mod snapshot;
@@ -9,7 +9,7 @@ mod start;
 
 pub use delta::ValueChange;
 pub(crate) use delta::{Guide, MOST_FOLLOW, Scale, Scratch, code_changes};
-#[cfg(feature = "zstd")]
+#[cfg(feature = "publish")]
 pub(crate) use goal::{Fit, Goal};
 pub(crate) use near::Near;
 pub(crate) use snapshot::code_values;

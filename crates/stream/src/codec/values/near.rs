@@ -13,6 +13,9 @@ pub(crate) const NEIGHBOURS: usize = 4;
 /// What each counts for, the nearest first, in 8ths.
 pub(crate) const SHARES: [i32; NEIGHBOURS] = [3, 2, 2, 1];
 
+/// How far neighbours may be, in 2 to the power of the layout's local bits: about the distance of points.
+const REACH: u32 = 2;
+
 /// Most blocks that neighbours are looked for in.
 const BLOCKS_SEARCHED: usize = 12;
 
@@ -28,7 +31,7 @@ pub(crate) type Back = [[u16; NEIGHBOURS]; BLOCK];
 /// Neighbours, found when they are first asked for, block by block.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Near {
-    /// How far neighbours may be, steps of integer coordinates.
+    /// How far neighbours may be, in steps of integer coordinates.
     reach: u32,
     /// Least and largest coordinates of each block.
     boxes: Vec<[[u32; 3]; 2]>,
@@ -51,13 +54,17 @@ impl Near {
             }
         }
         let slots = vec![0; boxes.len()];
-        Near { reach: 3 << local_bits, boxes, slots, found: Vec::new() }
+        Near { reach: REACH << local_bits, boxes, slots, found: Vec::new() }
     }
 
     /// The neighbours of a block's points, kept for the next time.
     pub(crate) fn of_block(&mut self, layout: &PointLayout, block: usize) -> &Back {
         if self.slots[block] == 0 {
             let back = self.find(layout, block);
+            if self.found.len() == self.found.capacity() {
+                // Sparingly: it stays.
+                self.found.reserve_exact((self.found.len() / 8).max(16));
+            }
             self.found.push(back);
             self.slots[block] = self.found.len() as u32;
         }
@@ -139,13 +146,18 @@ impl Candidate {
     /// How far the nearest of `candidates` are back that come before this one; the list is in order, the last first.
     /// Where there are fewer than there should be, the nearest counts for them too.
     fn nearest(&self, candidates: &[Candidate], reach: u32) -> [u16; NEIGHBOURS] {
-        let most = u64::from(reach) * u64::from(reach);
-        let mut best = [(u64::MAX, 0u16); NEIGHBOURS];
+        let mut best = [(u64::from(reach) * u64::from(reach) + 1, 0u16); NEIGHBOURS];
         let before = candidates.partition_point(|other| other.point >= self.point);
         for other in &candidates[before..] {
-            let distance = self.distance(other);
+            let farthest = best[NEIGHBOURS - 1].0;
+            // Normals only make it farther.
+            let squared = self.squared_distance(other);
+            if squared >= farthest {
+                continue;
+            }
+            let distance = self.stretched(other, squared);
             let back = self.point - other.point;
-            if distance > most || distance >= best[NEIGHBOURS - 1].0 || back > MOST_BACK {
+            if distance >= farthest || back > MOST_BACK {
                 continue;
             }
             let mut at = NEIGHBOURS - 1;
@@ -159,12 +171,15 @@ impl Candidate {
         best.map(|(_, back)| if back == 0 { nearest } else { back })
     }
 
-    /// Squared distance, larger the more the normals differ; endless where they are at right angles or more.
-    fn distance(&self, other: &Candidate) -> u64 {
-        let (mut squared, mut turned, mut facing) = (0u64, 0u64, 0i32);
+    fn squared_distance(&self, other: &Candidate) -> u64 {
+        let step = |axis: usize| i64::from(self.position[axis] - other.position[axis]);
+        (step(0) * step(0) + step(1) * step(1) + step(2) * step(2)) as u64
+    }
+
+    /// A squared distance, larger the more the normals differ; endless where they are at right angles or more.
+    fn stretched(&self, other: &Candidate, squared: u64) -> u64 {
+        let (mut turned, mut facing) = (0u64, 0i32);
         for axis in 0..3 {
-            let step = u64::from(self.position[axis].abs_diff(other.position[axis]));
-            squared += step * step;
             let turn = u64::from(self.normal[axis].abs_diff(other.normal[axis]));
             turned += turn * turn;
             facing += self.normal[axis] * other.normal[axis];
