@@ -42,9 +42,7 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
         let kind = u8::from(frame.kind == FrameKind::Delta);
         seeds.push(("decode_frame", format!("{name}-payload"), [&[kind], payload].concat()));
     };
-    let publish = |publisher: &mut Publisher, store: &PointStore| {
-        publisher.publish(store).expect("a change")
-    };
+    let publish = |publisher: &mut Publisher, store: &PointStore| publisher.publish(store).expect("a change");
     let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
     let mut store = sample();
     let snapshot = publish(&mut publisher, &store);

@@ -33,11 +33,7 @@ pub(crate) fn server_config(scene: &Scene, args: &LightArgs) -> Result<ServerCon
             seed: visibility.seed,
             ..GenerateParams::default()
         },
-        update: UpdateParams {
-            rays: visibility.point_rays,
-            rays_still: step.rays_still,
-            radius_m,
-        },
+        update: UpdateParams { rays: visibility.point_rays, rays_still: step.rays_still, radius_m },
         publish: PublisherConfig { precision: precision(visibility), ..PublisherConfig::default() },
         ..ServerConfig::default()
     })

@@ -18,8 +18,8 @@ use dapple_trace::psao::update::UpdateParams;
 use dapple_trace::rtao::{RtaoParams, trace_visibility_with_progress};
 
 use crate::args::{RenderArgs, RenderMethod, View};
-use crate::light::precision;
 use crate::exr_file::{write_gray, write_rgb};
+use crate::light::precision;
 use crate::picture::{sites, write_png};
 use crate::progress::Bar;
 use crate::source::{self, Loaded};
@@ -188,11 +188,7 @@ fn light(args: &RenderArgs, loaded: &Loaded) -> Result<(Server, Client)> {
             seed: args.visibility.seed,
             ..GenerateParams::default()
         },
-        update: UpdateParams {
-            rays: args.visibility.point_rays,
-            radius_m,
-            ..UpdateParams::default()
-        },
+        update: UpdateParams { rays: args.visibility.point_rays, radius_m, ..UpdateParams::default() },
         publish: PublisherConfig { precision: precision(&args.visibility), ..PublisherConfig::default() },
         ..ServerConfig::default()
     };

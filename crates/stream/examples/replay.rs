@@ -9,7 +9,7 @@ use dapple_store::points::PointStore;
 use dapple_stream::{Limits, Precision, Publisher, PublisherConfig, Recording, Subscriber};
 
 /// Tolerances and steps that are tried.
-const PRECISIONS: [(u8, u8); 7] = [(0, 1), (2, 5), (3, 6), (4, 8), (5, 10), (6, 12), (8, 16)];
+const PRECISIONS: [(u8, u8); 7] = [(0, 1), (3, 6), (4, 8), (5, 8), (6, 8), (8, 8), (8, 12)];
 
 fn main() {
     let mut arguments = std::env::args().skip(1).peekable();
@@ -18,7 +18,9 @@ fn main() {
         let bytes = std::fs::read(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
         let (states, seconds) = states(&bytes).unwrap_or_else(|error| panic!("{path}: {error}"));
         println!("{path}: {} states of {} points in {seconds:.2} s", states.len(), states[0].layout().len());
-        println!("  precision   Mbit/s  bits/change  rms where it moves  largest   encode  decode (ns/change)");
+        println!(
+            "  precision   Mbit/s  bits/change  rms where it moves  largest   encode  decode (ns/change)"
+        );
         for (tolerance, step) in PRECISIONS {
             let sent = send(&states, Precision { tolerance, step });
             println!(

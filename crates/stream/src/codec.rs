@@ -16,15 +16,17 @@ mod plane;
 mod values;
 mod varint;
 
-pub(crate) use decode::{DecodedLayout, decode_changes, decode_layout, decode_values, parse_delta, parse_snapshot};
+pub(crate) use decode::{
+    DecodedLayout, decode_changes, decode_layout, decode_values, parse_delta, parse_snapshot,
+};
 #[cfg(feature = "publish")]
 pub(crate) use encode::{EncodedLayout, delta_payload, encode_layout, snapshot_payload};
 pub(crate) use frame::open;
 pub use frame::{FrameHeader, FrameKind, MAGIC, VERSION, seal};
-pub use values::{ValueChange, first_chances};
 #[cfg(feature = "publish")]
 pub(crate) use values::{Fit, Goal};
 pub(crate) use values::{Near, Scratch};
+pub use values::{ValueChange, first_chances};
 
 use dapple_store::points::LayoutError;
 

@@ -142,7 +142,8 @@ fn limits_hold() {
 #[test]
 fn rules_of_the_format_are_enforced() {
     // A layout of one point at (1, 2, 3): quantum 1, spacing 1, 0 local bits, one set, no cuts; then choices.
-    let set = PointSet { positions: vec![[1, 2, 3]], normals: vec![PackedNormal([0, 0])], ..Default::default() };
+    let set =
+        PointSet { positions: vec![[1, 2, 3]], normals: vec![PackedNormal([0, 0])], ..Default::default() };
     let layout = PointLayout::new(1.0, 1.0, vec![set]).unwrap();
     let store = PointStore::new(layout.into(), vec![77]).unwrap();
     let good = |cuts: Vec<SetCuts>| {
@@ -184,7 +185,9 @@ fn rules_of_the_format_are_enforced() {
     assert_eq!(snapshot(&layout, one), Ok(Applied::NewLayout));
     assert!(with(&layout, 26, &[9]).contains("does not exist"), "of nine sites");
     assert!(with(&layout, 31, &[0]).contains("a set has none"));
-    assert!(with(&layout, 31, &[2]).contains("layout: ends early") || with(&layout, 31, &[2]).contains("cut"));
+    assert!(
+        with(&layout, 31, &[2]).contains("layout: ends early") || with(&layout, 31, &[2]).contains("cut")
+    );
     let over = [0x80, 0x80, 0x80, 0x80, 0x10];
     assert!(with(&layout, 25, &over).contains("exceeds 32 bits"));
     assert!(with(&layout, 26, &over).contains("exceed 32 bits"));

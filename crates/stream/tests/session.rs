@@ -9,7 +9,8 @@ mod random;
 use common::same_bits;
 use dapple_store::points::{Change, PointStore};
 use dapple_stream::{
-    Applied, Frame, FrameKind, IgnoreReason, Limits, Precision, Publisher, PublisherConfig, ReceiveError, Subscriber,
+    Applied, Frame, FrameKind, IgnoreReason, Limits, Precision, Publisher, PublisherConfig, ReceiveError,
+    Subscriber,
 };
 use proptest::prelude::*;
 use random::stores;

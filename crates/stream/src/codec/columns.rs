@@ -101,7 +101,8 @@ impl CutColumns {
         let gaps = &mut self.gaps;
         let gap = u64::from(cut.site).wrapping_sub(self.next);
         let gap = code_varint(coder, gap, |coder, byte| gaps.code(coder, byte, 8));
-        let site = gap.ok_or(("cut gaps", "are no numbers in their shortest form"))?.saturating_add(self.next);
+        let site =
+            gap.ok_or(("cut gaps", "are no numbers in their shortest form"))?.saturating_add(self.next);
         let site = u32::try_from(site).map_err(|_| ("cut gaps", "name a site that does not exist"))?;
         self.next = u64::from(site) + 1;
         let [low, high] = cut.mask.to_le_bytes();
@@ -154,11 +155,7 @@ impl Alone {
 }
 
 /// Codes a varint byte by byte; a reader gets what is none in its shortest form, or exceeds 63 bits, as `None`.
-fn code_varint<C: Coder>(
-    coder: &mut C,
-    number: u64,
-    mut code: impl FnMut(&mut C, u8) -> u8,
-) -> Option<u64> {
+fn code_varint<C: Coder>(coder: &mut C, number: u64, mut code: impl FnMut(&mut C, u8) -> u8) -> Option<u64> {
     let (mut left, mut read) = (number, 0);
     for at in 0..MAX_VARINT_BYTES - 1 {
         let byte = code(coder, (left & 0x7f) as u8 | u8::from(left > 0x7f) << 7);

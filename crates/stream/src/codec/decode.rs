@@ -62,9 +62,9 @@ pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<DecodedLayo
         columns.begin_set();
         for _ in 0..count {
             let before = (&set.positions[..], &set.normals[..]);
-            let (position, normal) = columns
-                .code(&mut coded, before, None)
-                .map_err(|(part, reason)| if coded.is_exhausted() { ended.clone() } else { bad(part, reason) })?;
+            let (position, normal) = columns.code(&mut coded, before, None).map_err(|(part, reason)| {
+                if coded.is_exhausted() { ended.clone() } else { bad(part, reason) }
+            })?;
             if coded.is_exhausted() {
                 return Err(ended);
             }
@@ -79,9 +79,9 @@ pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<DecodedLayo
         columns.begin_set();
         set.cuts = Vec::with_capacity(count.min(most));
         for _ in 0..count {
-            let cut = columns
-                .code(&mut coded, SiteCut { site: 0, mask: 0 })
-                .map_err(|(part, reason)| if coded.is_exhausted() { ended.clone() } else { bad(part, reason) })?;
+            let cut = columns.code(&mut coded, SiteCut { site: 0, mask: 0 }).map_err(|(part, reason)| {
+                if coded.is_exhausted() { ended.clone() } else { bad(part, reason) }
+            })?;
             if coded.is_exhausted() {
                 return Err(ended);
             }
@@ -102,7 +102,10 @@ pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<DecodedLayo
 }
 
 /// The table of sets of cuts, still without cuts, and how many each has: together within the limits.
-fn decode_cut_sets(reader: &mut Reader<'_>, limits: &Limits) -> Result<(Vec<SetCuts>, Vec<usize>), DecodeError> {
+fn decode_cut_sets(
+    reader: &mut Reader<'_>,
+    limits: &Limits,
+) -> Result<(Vec<SetCuts>, Vec<usize>), DecodeError> {
     let part = "cuts";
     let bad = |reason| DecodeError::Malformed { part, reason };
     let count = reader.varint(part)?;

@@ -85,8 +85,7 @@ pub(crate) fn snapshot_payload(
     write_varint(&mut out, encoded.bytes.len() as u64);
     out.extend(&encoded.bytes);
     let mut writer = Writer::new(out);
-    code_values(&mut writer, layout, near, |point| visibility[point])
-        .expect("only reading fails");
+    code_values(&mut writer, layout, near, |point| visibility[point]).expect("only reading fails");
     writer.finish()
 }
 

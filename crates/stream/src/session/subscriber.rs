@@ -145,9 +145,9 @@ impl Subscriber {
     /// Bytes held for what comes next, by capacity: the encoded layout and what deltas are foretold from. Store and cuts, which
     /// others see, are not counted.
     pub fn bytes(&self) -> usize {
-        self.state.as_ref().map_or(0, |state| {
-            state.layout_bytes.capacity() + state.near.bytes() + state.scratch.bytes()
-        })
+        self.state
+            .as_ref()
+            .map_or(0, |state| state.layout_bytes.capacity() + state.near.bytes() + state.scratch.bytes())
     }
 
     /// Hash of the scene that the held light belongs to.

@@ -49,3 +49,28 @@ impl Default for Number {
         Number::starting_at([128; COUNTED])
     }
 }
+
+#[cfg(all(test, feature = "publish"))]
+mod tests {
+    use super::*;
+    use crate::codec::entropy::{Reader, Writer};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn reading_inverts_writing(numbers in prop::collection::vec((0u32..263, 0u32..263), 0..200)) {
+            let mut writer = Writer::new(Vec::new());
+            let mut chances = Number::default();
+            for (value, most) in &numbers {
+                chances.code(&mut writer, (*value).min(*most), *most);
+            }
+            let bytes = writer.finish();
+            let mut reader = Reader::new(&bytes);
+            let mut chances = Number::default();
+            for (value, most) in &numbers {
+                prop_assert_eq!(chances.code(&mut reader, 0, *most), *value.min(most));
+            }
+            prop_assert!(reader.is_complete());
+        }
+    }
+}

@@ -32,10 +32,12 @@ impl Chance {
     }
 
     /// Probability of 1 in 65,536ths: 1 … 65,535.
+    #[inline]
     fn of_one(self) -> u32 {
         ((u32::from(self.quick) + u32::from(self.slow)) >> 1).max(1)
     }
 
+    #[inline]
     fn learn(&mut self, one: bool) {
         for (estimate, rate) in [(&mut self.quick, QUICK), (&mut self.slow, SLOW)] {
             if one {
@@ -126,6 +128,7 @@ impl Writer {
 
 #[cfg(feature = "publish")]
 impl Coder for Writer {
+    #[inline]
     fn bit(&mut self, chance: &mut Chance, one: bool) -> bool {
         let bound = (self.range >> 16) * chance.of_one();
         if one {
@@ -179,6 +182,7 @@ impl<'a> Reader<'a> {
 }
 
 impl Coder for Reader<'_> {
+    #[inline]
     fn bit(&mut self, chance: &mut Chance, _: bool) -> bool {
         let bound = (self.range >> 16) * chance.of_one();
         let one = self.code < bound;
@@ -198,5 +202,86 @@ impl Coder for Reader<'_> {
 
     fn is_exhausted(&self) -> bool {
         self.read > self.bytes.len() + AHEAD
+    }
+}
+
+#[cfg(all(test, feature = "publish"))]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Choices with some of eight chances, so that some are learned well and some are not.
+    fn choices() -> impl Strategy<Value = Vec<(usize, bool)>> {
+        let rare =
+            (0usize..8, prop::sample::select(vec![false; 60].into_iter().chain([true]).collect::<Vec<_>>()));
+        prop::collection::vec(prop_oneof![(0usize..8, any::<bool>()), rare, Just((7, true))], 0..3000)
+    }
+
+    fn write(choices: &[(usize, bool)]) -> Vec<u8> {
+        let mut writer = Writer::new(vec![1, 2, 3]);
+        let mut chances = [Chance::EVEN; 8];
+        for &(at, one) in choices {
+            assert_eq!(writer.bit(&mut chances[at], one), one);
+        }
+        writer.finish().split_off(3)
+    }
+
+    proptest! {
+        #[test]
+        fn reading_inverts_writing(choices in choices()) {
+            let bytes = write(&choices);
+            let mut reader = Reader::new(&bytes);
+            let mut chances = [Chance::EVEN; 8];
+            for &(at, one) in &choices {
+                prop_assert_eq!(reader.bit(&mut chances[at], !one), one);
+                prop_assert!(!reader.is_exhausted());
+            }
+            prop_assert!(reader.is_complete());
+            // Within a byte or two of what the chances allow.
+            let mut chances = [Chance::EVEN; 8];
+            let mut bits = 0.0;
+            for &(at, one) in &choices {
+                let share = f64::from(chances[at].of_one()) / 65536.0;
+                bits -= (if one { share } else { 1.0 - share }).log2();
+                chances[at].learn(one);
+            }
+            prop_assert!(bytes.len() as f64 <= bits * 1.002 / 8.0 + 2.0, "{} bytes for {bits} bits", bytes.len());
+        }
+
+        #[test]
+        fn any_bytes_are_read_and_run_out(bytes in prop::collection::vec(any::<u8>(), 0..50), one: bool) {
+            let mut reader = Reader::new(&bytes);
+            let mut chances = [Chance::EVEN; 2];
+            let mut read = 0;
+            while !reader.is_exhausted() && read < 1_000_000 {
+                let which = reader.bit(&mut chances[0], one);
+                reader.bit(&mut chances[usize::from(which)], one);
+                read += 1;
+            }
+            prop_assert!(reader.is_exhausted() || read == 1_000_000);
+            prop_assert!(!reader.is_complete() || !reader.is_exhausted());
+        }
+    }
+
+    #[test]
+    fn a_carry_runs_through_full_bytes() {
+        // Zeros lift the lower end towards 1; the last choices lift it over.
+        for zeros in 0..200 {
+            let choices: Vec<(usize, bool)> =
+                (0..zeros).map(|i| (i % 8, false)).chain([(0, true), (1, true), (2, false)]).collect();
+            let bytes = write(&choices);
+            let mut reader = Reader::new(&bytes);
+            let mut chances = [Chance::EVEN; 8];
+            assert!(
+                choices.iter().all(|&(at, one)| reader.bit(&mut chances[at], false) == one),
+                "{zeros} zeros"
+            );
+        }
+    }
+
+    #[test]
+    fn equal_choices_cost_next_to_nothing() {
+        let bytes = write(&vec![(3, false); 100_000]);
+        assert!(bytes.len() < 40, "{} bytes", bytes.len());
     }
 }

@@ -209,8 +209,7 @@ impl<C: Coder, G: Guide> Walk<'_, C, G> {
                 self.chances.code_number(self.coder, &around, gap, wanted)
             };
             let new = (expected + number * i32::from(self.scale.step)).clamp(0, 255);
-            self.scratch.cells[slot][point % BLOCK] =
-                ((new - old) << 4 | number.abs().min(MOST_SIZE)) as i16;
+            self.scratch.cells[slot][point % BLOCK] = ((new - old) << 4 | number.abs().min(MOST_SIZE)) as i16;
             if new != old {
                 self.changes.push(ValueChange { point: point as u32, old: old as u8, new: new as u8 });
             }
@@ -250,13 +249,15 @@ impl Chances {
         let gap = if down { -gap } else { gap };
         let (closed, open) = if down { (low, high) } else { (high, low) };
         let edge = if closed { 2 } else { usize::from(open) };
-        let sign = (rank(gap, [-128, -48, -16, 16, 48, 128, 320]) * 5 + rank(strength, [1, 24, 64, 160])) * 3 + edge;
+        let sign =
+            (rank(gap, [-128, -48, -16, 16, 48, 128, 320]) * 5 + rank(strength, [1, 24, 64, 160])) * 3 + edge;
         let falls = coder.bit(&mut self.against[sign], (wanted < 0) != down) != down;
         let room = if falls { expected } else { 255 - expected };
         // More than brings the value to its end would say nothing.
         let most = (room.max(1) - 1) / step;
         let kind = rank(size, [1, 8, 16, 32]) * 5 + rank(strength, [1, 32, 96, 224]);
-        let number = 1 + self.size[kind].code(coder, wanted.unsigned_abs().saturating_sub(1), most as u32) as i32;
+        let number =
+            1 + self.size[kind].code(coder, wanted.unsigned_abs().saturating_sub(1), most as u32) as i32;
         if falls { -number } else { number }
     }
 }

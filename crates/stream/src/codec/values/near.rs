@@ -73,7 +73,9 @@ impl Near {
 
     /// Bytes held, by capacity.
     pub(crate) fn bytes(&self) -> usize {
-        size_of_val(&self.boxes[..]) + size_of_val(&self.slots[..]) + self.found.capacity() * size_of::<Back>()
+        size_of_val(&self.boxes[..])
+            + size_of_val(&self.slots[..])
+            + self.found.capacity() * size_of::<Back>()
     }
 
     /// The neighbours of a block's points.
@@ -185,5 +187,68 @@ impl Candidate {
             facing += self.normal[axis] * other.normal[axis];
         }
         if facing <= 0 { u64::MAX } else { squared * (ALIKE + turned) / ALIKE }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dapple_store::points::{PointSet, morton_code};
+    use proptest::prelude::*;
+
+    fn layout(sets: Vec<Vec<([u32; 3], [u8; 2])>>) -> PointLayout {
+        let set = |(instance, mut points): (usize, Vec<([u32; 3], [u8; 2])>)| {
+            points.sort_by_key(|&(position, normal)| (morton_code(position), normal));
+            PointSet {
+                instance: instance as u32,
+                positions: points.iter().map(|point| point.0).collect(),
+                normals: points.iter().map(|point| PackedNormal(point.1)).collect(),
+                ..PointSet::default()
+            }
+        };
+        PointLayout::new(1.0, 8.0, sets.into_iter().enumerate().map(set).collect()).unwrap()
+    }
+
+    fn points() -> impl Strategy<Value = Vec<([u32; 3], [u8; 2])>> {
+        let normal = prop_oneof![Just([127, 127]), Just([127, 140]), Just([127, 254]), any::<[u8; 2]>()];
+        prop::collection::vec((prop::array::uniform3(0u32..60), normal), 0..150)
+    }
+
+    proptest! {
+        #[test]
+        fn neighbours_are_the_nearest_before(sets in prop::collection::vec(points(), 1..4)) {
+            let layout = layout(sets);
+            let mut near = Near::new(&layout, 3);
+            for set in layout.sets() {
+                for at in 0..set.len() {
+                    let point = set.first as usize + at;
+                    let found = near.of_block(&layout, point / BLOCK)[point % BLOCK];
+                    let own = Candidate::new(0, set.positions[at], set.normals[at]);
+                    // So few points that all blocks are searched; the box around a block holds all that are within reach.
+                    let mut all: Vec<(u64, u16)> = (0..at)
+                        .map(|other| {
+                            let candidate = Candidate::new(0, set.positions[other], set.normals[other]);
+                            let squared = own.squared_distance(&candidate);
+                            (own.stretched(&candidate, squared), (at - other) as u16)
+                        })
+                        .filter(|(distance, _)| *distance <= 16 * 16)
+                        .collect();
+                    all.sort_unstable();
+                    let nearest = all.first().map_or(0, |first| first.1);
+                    let expected: Vec<u16> =
+                        (0..NEIGHBOURS).map(|k| all.get(k).map_or(nearest, |found| found.1)).collect();
+                    prop_assert_eq!(&found[..], &expected[..], "point {}", point);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn points_of_other_sets_and_of_the_other_side_are_no_neighbours() {
+        let up = |x: u32| ([x, 5, 5], [127, 127]);
+        let down = |x: u32| ([x, 5, 5], [0, 0]);
+        let layout = layout(vec![vec![up(1), down(2), up(3)], vec![up(2)]]);
+        let back = *Near::new(&layout, 3).of_block(&layout, 0);
+        assert_eq!(back[..4], [[0; 4], [0; 4], [2; 4], [0; 4]]);
     }
 }
