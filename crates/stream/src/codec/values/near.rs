@@ -196,8 +196,10 @@ mod tests {
     use dapple_store::points::{PointSet, morton_code};
     use proptest::prelude::*;
 
-    fn layout(sets: Vec<Vec<([u32; 3], [u8; 2])>>) -> PointLayout {
-        let set = |(instance, mut points): (usize, Vec<([u32; 3], [u8; 2])>)| {
+    type Points = Vec<([u32; 3], [u8; 2])>;
+
+    fn layout(sets: Vec<Points>) -> PointLayout {
+        let set = |(instance, mut points): (usize, Points)| {
             points.sort_by_key(|&(position, normal)| (morton_code(position), normal));
             PointSet {
                 instance: instance as u32,
@@ -209,7 +211,7 @@ mod tests {
         PointLayout::new(1.0, 8.0, sets.into_iter().enumerate().map(set).collect()).unwrap()
     }
 
-    fn points() -> impl Strategy<Value = Vec<([u32; 3], [u8; 2])>> {
+    fn points() -> impl Strategy<Value = Points> {
         let normal = prop_oneof![Just([127, 127]), Just([127, 140]), Just([127, 254]), any::<[u8; 2]>()];
         prop::collection::vec((prop::array::uniform3(0u32..60), normal), 0..150)
     }
