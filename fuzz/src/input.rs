@@ -80,5 +80,5 @@ impl Input<'_> {
 /// The frame that carries a store: equal bytes mean stores that are equal to the bit.
 pub(crate) fn fingerprint(store: &PointStore) -> Arc<[u8]> {
     let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
-    publisher.publish(store).expect("memory suffices").expect("the first state").bytes
+    publisher.publish(store).expect("the first state").bytes
 }

@@ -1,7 +1,7 @@
 //! Any list of calls on a publisher and its subscribers: they converge.
 
 use dapple_store::points::{Change, PointStore};
-use dapple_stream::{Applied, Frame, Limits, Publisher, PublisherConfig, Subscriber};
+use dapple_stream::{Applied, Frame, Limits, Precision, Publisher, PublisherConfig, Subscriber};
 
 use crate::input::{Input, fingerprint};
 
@@ -11,6 +11,7 @@ const MAX_CALLS: usize = 200;
 /// One publisher, one subscriber that hears everything, two that hear what the bytes choose.
 struct Session {
     publisher: Publisher,
+    tolerance: u8,
     store: PointStore,
     live: Subscriber,
     lossy: [Subscriber; 2],
@@ -24,16 +25,18 @@ pub fn session_ops(data: &[u8]) {
     let config = PublisherConfig {
         first_group: u64::from(input.byte()),
         deltas_per_group: u32::from(input.byte()) % 8,
+        precision: Precision { tolerance: input.byte() % 16, step: input.byte() % 20 },
     };
     let subscriber = Subscriber::new(Some([3; 32]), Limits::default());
     let mut session = Session {
         publisher: Publisher::new([3; 32], config),
+        tolerance: config.precision.tolerance,
         store: input.store(),
         live: subscriber.clone(),
         lossy: [subscriber.clone(), subscriber],
         sent: Vec::new(),
     };
-    assert!(session.publisher.join().expect("nothing to compress").is_none());
+    assert!(session.publisher.join().is_none());
     session.publish();
     for _ in 0..MAX_CALLS {
         if input.is_empty() {
@@ -62,7 +65,7 @@ impl Session {
                 self.publish();
             }
             2 => {
-                let frame = self.publisher.publish(&self.store).expect("memory suffices");
+                let frame = self.publisher.publish(&self.store);
                 assert!(frame.is_none(), "a still scene sends nothing");
             }
             3 => {
@@ -70,7 +73,7 @@ impl Session {
                 self.publish();
             }
             4 => {
-                let frame = self.publisher.start_group().expect("memory suffices");
+                let frame = self.publisher.start_group();
                 self.send(frame);
             }
             5 => {
@@ -93,7 +96,7 @@ impl Session {
     }
 
     fn publish(&mut self) {
-        let frame = self.publisher.publish(&self.store).expect("memory suffices");
+        let frame = self.publisher.publish(&self.store);
         self.send(frame);
     }
 
@@ -107,7 +110,7 @@ impl Session {
     }
 
     fn rejoin(&mut self, which: usize) {
-        let frame = self.publisher.join().expect("memory suffices").expect("something is published");
+        let frame = self.publisher.join().expect("something is published");
         self.lossy[which].receive(&frame.bytes).expect("a snapshot is always welcome");
         self.check(&self.lossy[which]);
     }
@@ -115,7 +118,10 @@ impl Session {
     /// `subscriber` is up to date.
     fn check(&self, subscriber: &Subscriber) {
         let held = subscriber.store().expect("it has a snapshot");
-        assert!(fingerprint(held) == fingerprint(&self.store), "the stores differ");
+        let published = self.publisher.store().expect("something is published");
+        assert!(fingerprint(held) == fingerprint(published), "the stores differ");
+        let pairs = held.visibility().iter().zip(self.store.visibility());
+        assert!(pairs.clone().all(|(a, b)| a.abs_diff(*b) <= self.tolerance), "a value is too far off");
         assert_eq!(
             (subscriber.group(), subscriber.epoch()),
             (self.publisher.group(), self.publisher.epoch())

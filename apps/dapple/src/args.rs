@@ -104,7 +104,7 @@ pub(crate) struct VisibilityArgs {
     /// Rays a point, 1 to 256.
     #[arg(long, value_name = "N", default_value_t = 64)]
     pub(crate) point_rays: u32,
-    /// Change of a point's visibility (0 to 255) that is not sent.
+    /// How far off the visibility of a point (0 to 255) may be where it moves: less is more exact, and more bits.
     #[arg(long, value_name = "T", default_value_t = 4)]
     pub(crate) threshold: u8,
     /// Seed of all random numbers.

@@ -3,11 +3,11 @@
 use anyhow::{Context, Result, bail};
 use dapple_scene::Scene;
 use dapple_server::{Progress, Server, ServerConfig};
-use dapple_stream::{PublisherConfig, Recorder, RecordingHeader};
+use dapple_stream::{Precision, PublisherConfig, Recorder, RecordingHeader};
 use dapple_trace::psao::generate::GenerateParams;
 use dapple_trace::psao::update::{StepInput, UpdateParams};
 
-use crate::args::LightArgs;
+use crate::args::{LightArgs, VisibilityArgs};
 use crate::progress::Bar;
 use crate::source::{self, Loaded};
 
@@ -33,14 +33,15 @@ pub(crate) fn server_config(scene: &Scene, args: &LightArgs) -> Result<ServerCon
             seed: visibility.seed,
             ..GenerateParams::default()
         },
-        update: UpdateParams {
-            rays: visibility.point_rays,
-            rays_still: step.rays_still,
-            radius_m,
-            threshold: visibility.threshold,
-        },
+        update: UpdateParams { rays: visibility.point_rays, rays_still: step.rays_still, radius_m },
+        publish: PublisherConfig { precision: precision(visibility), ..PublisherConfig::default() },
         ..ServerConfig::default()
     })
+}
+
+/// How exactly changes are sent.
+pub(crate) fn precision(args: &VisibilityArgs) -> Precision {
+    Precision { tolerance: args.threshold, ..Precision::default() }
 }
 
 /// Seconds after which the scene repeats: those of its animation, or ten of a still scene.

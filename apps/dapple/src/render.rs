@@ -11,7 +11,7 @@ use dapple_render::psao::{Hat, Kernel};
 use dapple_scene::PosedCamera;
 use dapple_scene::glam::Vec3;
 use dapple_server::{Progress, Server, ServerConfig};
-use dapple_stream::Limits;
+use dapple_stream::{Limits, PublisherConfig};
 use dapple_trace::Tracer;
 use dapple_trace::psao::generate::GenerateParams;
 use dapple_trace::psao::update::UpdateParams;
@@ -19,6 +19,7 @@ use dapple_trace::rtao::{RtaoParams, trace_visibility_with_progress};
 
 use crate::args::{RenderArgs, RenderMethod, View};
 use crate::exr_file::{write_gray, write_rgb};
+use crate::light::precision;
 use crate::picture::{sites, write_png};
 use crate::progress::Bar;
 use crate::source::{self, Loaded};
@@ -187,12 +188,8 @@ fn light(args: &RenderArgs, loaded: &Loaded) -> Result<(Server, Client)> {
             seed: args.visibility.seed,
             ..GenerateParams::default()
         },
-        update: UpdateParams {
-            rays: args.visibility.point_rays,
-            radius_m,
-            threshold: args.visibility.threshold,
-            ..UpdateParams::default()
-        },
+        update: UpdateParams { rays: args.visibility.point_rays, radius_m, ..UpdateParams::default() },
+        publish: PublisherConfig { precision: precision(&args.visibility), ..PublisherConfig::default() },
         ..ServerConfig::default()
     };
     let bar = Bar::new("points", 1000);

@@ -129,7 +129,7 @@ fn updating_selectively_equals_tracing_every_point() {
     let pose = scene.pose(0.0);
     let mut tracer = Tracer::new(&scene, &pose);
     let points = generate_points(&scene, &pose, &tracer, &config(16.0, 16).generate, &|_| ()).unwrap();
-    let params = UpdateParams { rays: 16, threshold: 0, ..UpdateParams::default() };
+    let params = UpdateParams { rays: 16, ..UpdateParams::default() };
     let mut selective = Updater::new(&scene, &pose, &tracer, points, params, &|_| ()).unwrap();
     let mut thorough = selective.clone();
     let (mut changes, mut traced, mut all) = (0, 0, 0);

@@ -8,6 +8,7 @@
 pub mod clock;
 pub mod controls;
 pub mod pace;
+#[cfg(feature = "paper")]
 pub mod paper;
 pub mod rate;
 #[cfg(feature = "gpu")]

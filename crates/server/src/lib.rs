@@ -11,7 +11,7 @@ use std::sync::Arc;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Pose, Scene};
 use dapple_store::points::PointStore;
-use dapple_stream::{Frame, PublishError, Publisher, PublisherConfig};
+use dapple_stream::{Frame, Precision, Publisher, PublisherConfig};
 use dapple_trace::Tracer;
 use dapple_trace::psao::cuts::find_cuts;
 use dapple_trace::psao::generate::{
@@ -27,7 +27,7 @@ pub struct ServerConfig {
     pub generate: GenerateParams,
     /// How they are traced.
     pub update: UpdateParams,
-    /// How changes are grouped.
+    /// How changes are grouped, and how exactly they are sent. Its default here lets values be off by 4 of 255.
     pub publish: PublisherConfig,
     /// Whether rays find out which points must not count at which texels of a client's atlas, because something solid stands
     /// between them. Costs some seconds at the start and some bytes of each snapshot; light leaks less. Default true.
@@ -50,7 +50,7 @@ impl Default for ServerConfig {
         ServerConfig {
             generate: GenerateParams::default(),
             update: UpdateParams::default(),
-            publish: PublisherConfig::default(),
+            publish: PublisherConfig { precision: Precision { tolerance: 4, step: 0 }, ..Default::default() },
             cuts: true,
         }
     }
@@ -79,9 +79,9 @@ pub enum ServerError {
     /// The paper's table could not be made.
     #[error(transparent)]
     Paper(#[from] PaperError),
-    /// The changes could not be published.
-    #[error(transparent)]
-    Publish(#[from] PublishError),
+    /// The paper's frames could not be compressed, which means that memory ran out.
+    #[error("compression failed: {0}; free memory and step again")]
+    Compress(#[from] std::io::Error),
 }
 
 /// What one step did.
@@ -144,7 +144,7 @@ impl Server {
                 find_cuts(&scene, &pose, &tracer, layout, &|done| progress(Progress::Cutting(done, sets)));
             publisher.set_cuts(layout.clone(), cuts);
         }
-        publisher.publish(updater.store())?;
+        publisher.publish(updater.store());
         Ok(Server { scene, tracer, updater, publisher, dropped_inside })
     }
 
@@ -160,19 +160,19 @@ impl Server {
         let pose = self.scene.pose(now_s);
         self.tracer.update(&self.scene, &pose);
         let report = self.updater.step(&self.scene, &pose, &mut self.tracer, input);
-        let frame = self.publisher.publish(self.updater.store())?;
+        let frame = self.publisher.publish(self.updater.store());
         Ok(StepReport {
             frame,
             traced: report.counts.traced(),
             rays: report.counts.rays(),
             counts: report.counts,
-            changed: report.changes.len() as u32,
+            changed: self.publisher.changed(),
         })
     }
 
     /// The snapshot that brings a subscriber that joins now up to date. Encoded at most once an update.
     pub fn join(&mut self) -> Result<Option<Frame>, ServerError> {
-        Ok(self.publisher.join()?)
+        Ok(self.publisher.join())
     }
 
     /// How many bytes of a snapshot are cuts.
@@ -180,8 +180,13 @@ impl Server {
         self.publisher.cut_bytes()
     }
 
-    /// What has been published.
+    /// What has been published: what every subscriber that is up to date holds, to the bit.
     pub fn store(&self) -> &PointStore {
+        self.publisher.store().expect("a server publishes as it starts")
+    }
+
+    /// What was traced: what has been published is nowhere farther from it than the publisher's tolerance.
+    pub fn traced(&self) -> &PointStore {
         self.updater.store()
     }
 
@@ -200,8 +205,9 @@ impl Server {
         &self.scene
     }
 
-    /// Bytes held now for each point, tracer and scene not counted ([`Updater::bytes_per_point`]).
+    /// Bytes held now for each point, tracer and scene not counted ([`Updater::bytes_per_point`], [`Publisher::bytes`]).
     pub fn bytes_per_point(&self) -> f64 {
-        self.updater.bytes_per_point()
+        let points = self.store().layout().len().max(1) as f64;
+        self.updater.bytes_per_point() + self.publisher.bytes() as f64 / points
     }
 }

@@ -8,7 +8,6 @@ use std::sync::Arc;
 
 use dapple_scene::{PosedCamera, Scene};
 use dapple_store::cells::{CellTable, Overflow};
-use dapple_stream::PublishError;
 use dapple_stream::cells::{CellCodec, CellFrame, CellPublisher};
 use dapple_trace::Tracer;
 use dapple_trace::psao::paper::{PaperCounts, PaperParams, PaperUpdater, extended_view};
@@ -72,8 +71,6 @@ impl PaperServer {
     /// A parameter is out of range, or an instance has too many cells.
     pub fn new(server: Server, config: &PaperConfig) -> Result<PaperServer, ServerError> {
         let Server { scene, tracer, updater, .. } = server;
-        // With 0 the updater tells the exact value of every point; what is worth sending is decided here.
-        let updater = updater.with_threshold(0);
         let pose = scene.pose(0.0);
         let paper = PaperUpdater::new(&scene, &pose, &updater, config.params)?;
         let publisher = CellPublisher::new(scene.hash().0, config.codec, 0.0);
@@ -96,8 +93,7 @@ impl PaperServer {
         let counts = self.updater.step(&self.scene, &pose, &mut self.tracer, input).counts;
         let view = look.map(|look| extended_view(&look.camera, look.aspect, self.margin_degrees));
         let (changes, paper) = self.paper.step(&self.scene, &pose, &self.updater, view.as_ref());
-        let frame =
-            self.publisher.publish(self.paper.table(), &changes, now_s).map_err(PublishError::from)?;
+        let frame = self.publisher.publish(self.paper.table(), &changes, now_s)?;
         Ok(PaperReport { frame, counts, paper })
     }
 
@@ -106,7 +102,7 @@ impl PaperServer {
     /// # Errors
     /// The compressor failed.
     pub fn join(&self) -> Result<CellFrame, ServerError> {
-        Ok(self.publisher.join(self.paper.table()).map_err(PublishError::from)?)
+        Ok(self.publisher.join(self.paper.table())?)
     }
 
     /// What has been published.

@@ -3,9 +3,9 @@
 #[path = "../tests/common/cloud.rs"]
 mod cloud;
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use dapple_stream::{FrameHeader, Limits, Publisher, PublisherConfig, Subscriber};
+use dapple_stream::{FrameHeader, Limits, Precision, Publisher, PublisherConfig, Subscriber};
 
 fn main() {
     let store = cloud::hall(1, 200_000);
@@ -14,7 +14,7 @@ fn main() {
 
     let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
     let start = Instant::now();
-    let snapshot = publisher.publish(&store).expect("publishes").expect("a first frame").bytes;
+    let snapshot = publisher.publish(&store).expect("a first frame").bytes;
     println!("snapshot: {} bytes, layout and values coded in {:?}", snapshot.len(), start.elapsed());
     for (part, bytes) in snapshot_parts(&snapshot) {
         println!("  {part:22} {bytes:8} bytes {:7.2} bits a point", bytes as f64 * 8.0 / points as f64);
@@ -22,70 +22,68 @@ fn main() {
     let mut subscriber = Subscriber::new(None, Limits::default());
     let start = Instant::now();
     subscriber.receive(&snapshot).expect("a sound frame");
-    println!("  decoded in {:?}", start.elapsed());
+    let elapsed = start.elapsed();
+    println!("  decoded in {elapsed:?}, {} ns a point", elapsed.as_nanos() / points as u128);
     let start = Instant::now();
-    publisher.start_group().expect("starts").expect("a frame");
+    publisher.start_group().expect("a frame");
     println!("  made again with the same layout in {:?}", start.elapsed());
 
-    println!("deltas:");
+    let precision = Precision { tolerance: 4, step: 0 };
+    let config = PublisherConfig { precision, ..PublisherConfig::default() };
+    println!("deltas, values off by at most 4:");
     for (epoch, share) in [0.1, 0.01, 0.001, 0.0001].into_iter().enumerate() {
-        let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
-        publisher.publish(&store).expect("publishes");
+        let mut publisher = Publisher::new([0; 32], config);
+        publisher.publish(&store);
         let moved = cloud::moved(&store, epoch as u64 + 7, share);
         let changes = moved.visibility().iter().zip(store.visibility()).filter(|(a, b)| a != b).count();
         let start = Instant::now();
-        let delta = publisher.publish(&moved).expect("publishes").expect("changes").bytes;
+        let delta = publisher.publish(&moved).expect("changes").bytes;
         let encoded = start.elapsed();
-        let mut base = subscriber.clone();
+        // The first time neighbours are looked for, afterwards they are known.
+        let mut warm = subscriber.clone();
         let start = Instant::now();
-        base.receive(&delta).expect("a sound frame");
-        let decoded = start.elapsed();
+        warm.receive(&delta).expect("a sound frame");
+        let first = start.elapsed();
+        let mut times: Vec<_> = (0..9)
+            .map(|_| {
+                let again = publisher.start_group().expect("something is published");
+                warm.receive(&again.bytes).expect("a sound frame");
+                publisher.publish(&store);
+                let base = publisher.start_group().expect("something is published");
+                warm.receive(&base.bytes).expect("a sound frame");
+                let delta = publisher.publish(&moved).expect("changes");
+                let start = Instant::now();
+                warm.receive(&delta.bytes).expect("a sound frame");
+                start.elapsed()
+            })
+            .collect();
+        times.sort_unstable();
+        let nanoseconds = |time: Duration| time.as_nanos() as f64 / changes as f64;
         println!(
-            "  {changes:7} changes {:8} bytes {:6.2} bits a change, coded in {encoded:?}, decoded in {decoded:?}",
+            "  {changes:7} changes {:8} bytes {:6.2} bits a change; ns a change: coded in {:.0}, decoded in {:.0} at first, then in {:.0}",
             delta.len(),
-            delta.len() as f64 * 8.0 / changes as f64
+            delta.len() as f64 * 8.0 / changes as f64,
+            nanoseconds(encoded),
+            nanoseconds(first),
+            nanoseconds(times[times.len() / 2]),
         );
     }
     let start = Instant::now();
-    let none = publisher.publish(&store).expect("publishes");
+    let none = publisher.publish(&store);
     println!("  unchanged: {} bytes in {:?}", none.map_or(0, |f| f.bytes.len()), start.elapsed());
 }
 
-/// Walks over the sections of a snapshot (docs/wire.md).
-fn snapshot_parts(frame: &[u8]) -> Vec<(&'static str, usize)> {
+/// Bytes of the layout and of the values of a snapshot (docs/wire.md).
+fn snapshot_parts(frame: &[u8]) -> [(&'static str, usize); 2] {
     let header = FrameHeader::parse(frame, &Limits::default()).expect("a sound frame");
     let payload = &frame[header.header_bytes..][..header.payload_bytes];
-    let mut at = 32;
-    let varint = |at: &mut usize| {
-        let (mut value, mut shift) = (0usize, 0);
-        loop {
-            let byte = payload[*at];
-            *at += 1;
-            value |= usize::from(byte & 0x7f) << shift;
-            shift += 7;
-            if byte < 0x80 {
-                return value;
-            }
+    let (mut at, mut layout) = (32, 0);
+    loop {
+        let byte = payload[at];
+        layout |= usize::from(byte & 0x7f) << (7 * (at - 32));
+        at += 1;
+        if byte < 0x80 {
+            return [("layout", layout), ("values", payload.len() - at - layout)];
         }
-    };
-    varint(&mut at);
-    at += 9;
-    for _ in 0..varint(&mut at) {
-        varint(&mut at);
-        at += 12;
-        varint(&mut at);
     }
-    let mut parts = vec![("envelope, sets", header.header_bytes + at + 4)];
-    let names = ["normals, 1st", "normals, 2nd", "cells", "along, 1st", "along, 2nd", "across", "values"];
-    for name in names {
-        let start = at;
-        let head = varint(&mut at);
-        if head & 1 == 1 {
-            varint(&mut at);
-        }
-        at += head >> 1;
-        parts.push((name, at - start));
-    }
-    assert_eq!(at, payload.len());
-    parts
 }

@@ -3,22 +3,30 @@
 //! A snapshot is a layout and one value a point. Points are in Morton order, so a position is the distance of
 //! its cell from the previous point's cell and the place within the cell; of that place one coordinate follows
 //! nearly from the other two, because points lie on surfaces whose normals are known ([`plane`]). With the layout come
-//! the cuts: which points do not count at which texels. A delta is
-//! gaps between changed points and the differences from the values the receiver holds.
+//! the cuts: which points do not count at which texels. Values, and what changed of them, are foretold from neighbours and
+//! written by an entropy coder (`values/`, `entropy/`); a delta builds on the values the receiver holds and on nothing else.
 
+mod columns;
 mod decode;
-#[cfg(feature = "zstd")]
+#[cfg(feature = "publish")]
 mod encode;
+mod entropy;
 mod frame;
 mod plane;
-pub(crate) mod section;
+mod values;
 pub(crate) mod varint;
 
-pub(crate) use decode::{decode_layout, decode_steps, decode_values, parse_delta, parse_snapshot};
-#[cfg(feature = "zstd")]
-pub(crate) use encode::{delta_payload, encode_layout, snapshot_payload};
+pub(crate) use decode::{
+    DecodedLayout, decode_changes, decode_layout, decode_values, parse_delta, parse_snapshot,
+};
+#[cfg(feature = "publish")]
+pub(crate) use encode::{EncodedLayout, delta_payload, encode_layout, snapshot_payload};
 pub(crate) use frame::open;
 pub use frame::{FrameHeader, FrameKind, MAGIC, VERSION, seal};
+#[cfg(feature = "publish")]
+pub(crate) use values::{Fit, Goal};
+pub(crate) use values::{Near, Scratch};
+pub use values::{ValueChange, first_chances};
 
 use dapple_store::points::LayoutError;
 
@@ -109,11 +117,7 @@ pub enum DecodeError {
     Layout(#[from] LayoutError),
 }
 
-/// The start of every Zstandard frame, which sections leave out.
-pub(crate) const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
-
 /// Maps small differences of either sign, modulo 256, to small bytes.
-#[cfg(feature = "zstd")]
 fn zigzag(difference: u8) -> u8 {
     let d = difference as i8;
     ((d << 1) ^ (d >> 7)) as u8

@@ -3,10 +3,10 @@
 //! An *epoch* names a state of the publisher's store; a *group* is a snapshot and the deltas on top of it. Frames
 //! of one group build on each other, groups do not: the newest wins.
 
-#[cfg(feature = "zstd")]
+#[cfg(feature = "publish")]
 mod publisher;
 mod subscriber;
 
-#[cfg(feature = "zstd")]
-pub use publisher::{Frame, PublishError, Publisher, PublisherConfig};
-pub use subscriber::{Applied, IgnoreReason, ReceiveError, Subscriber, ValueChange};
+#[cfg(feature = "publish")]
+pub use publisher::{Frame, Precision, Publisher, PublisherConfig};
+pub use subscriber::{Applied, IgnoreReason, ReceiveError, Subscriber};

@@ -8,7 +8,7 @@ mod cloud;
 use std::sync::LazyLock;
 
 use dapple_store::charts::{Cuts, SetCuts, SiteCut};
-use dapple_store::points::PointStore;
+use dapple_store::points::{PackedNormal, PointLayout, PointSet, PointStore};
 use dapple_stream::codec::seal;
 use dapple_stream::{
     Applied, DecodeError, FrameHeader, FrameKind, Limits, Publisher, PublisherConfig, ReceiveError,
@@ -22,12 +22,12 @@ static SAMPLE: LazyLock<(PointStore, Vec<u8>, Vec<u8>)> = LazyLock::new(|| {
     let mut publisher = Publisher::new([1; 32], PublisherConfig::default());
     publisher.set_cuts(store.layout().clone(), cuts());
     for seed in 0..10 {
-        publisher.publish(&cloud::moved(&store, seed, 0.01)).unwrap();
+        publisher.publish(&cloud::moved(&store, seed, 0.01));
     }
-    publisher.publish(&store).unwrap();
-    let snapshot = publisher.join().unwrap().unwrap();
-    assert!(publisher.publish(&store).unwrap().is_none());
-    let delta = publisher.publish(&cloud::moved(&store, 4, 0.1)).unwrap().unwrap();
+    publisher.publish(&store);
+    let snapshot = publisher.join().unwrap();
+    assert!(publisher.publish(&store).is_none());
+    let delta = publisher.publish(&cloud::moved(&store, 4, 0.1)).unwrap();
     (store, snapshot.bytes.to_vec(), delta.bytes.to_vec())
 });
 
@@ -138,86 +138,76 @@ fn limits_hold() {
     }
 }
 
-/// Payloads written by hand, each of which breaks one rule of docs/wire.md.
+/// Payloads changed by hand so that each breaks one rule of docs/wire.md.
 #[test]
 fn rules_of_the_format_are_enforced() {
-    // A layout of one point at (1, 2, 3): quantum 1, spacing 1, 0 local bits, one set.
-    let layout = |cell: u8, local: u8, normal: u8| {
-        let mut out = Vec::new();
-        out.extend(1f32.to_le_bytes());
-        out.extend(1f32.to_le_bytes());
-        out.extend([0, 1, 0]);
-        out.extend([0; 12]);
-        out.extend([1, 2, normal, 2, 0, 2, cell, 2, local, 2, 0, 2, 0]);
-        out.extend([0, 0, 0, 0]);
-        out
+    // A layout of one point at (1, 2, 3): quantum 1, spacing 1, 0 local bits, one set, no cuts; then choices.
+    let set =
+        PointSet { positions: vec![[1, 2, 3]], normals: vec![PackedNormal([0, 0])], ..Default::default() };
+    let layout = PointLayout::new(1.0, 1.0, vec![set]).unwrap();
+    let store = PointStore::new(layout.into(), vec![77]).unwrap();
+    let good = |cuts: Vec<SetCuts>| {
+        let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
+        publisher.set_cuts(store.layout().clone(), Cuts::new(cuts).unwrap());
+        let bytes = payload(&publisher.publish(&store).unwrap().bytes);
+        let end = 33 + usize::from(bytes[32]);
+        (bytes[33..end].to_vec(), bytes[end..].to_vec())
     };
-    let snapshot = |layout: Vec<u8>, values: &[u8]| {
+    let snapshot = |layout: &[u8], values: &[u8]| {
         let mut out = vec![0; 32];
         out.push(layout.len() as u8);
         out.extend(layout);
         out.extend(values);
         Subscriber::new(None, Limits::default()).receive(&seal(FrameKind::Snapshot, 0, 0, &out))
     };
-    assert_eq!(snapshot(layout(53, 0, 0), &[2, 0]), Ok(Applied::NewLayout), "the rest would prove nothing");
+    let (layout, one) = good(Vec::new());
+    let (layout, one) = (&layout[..], &one[..]);
+    assert_eq!(snapshot(layout, one), Ok(Applied::NewLayout), "the rest would prove nothing");
     let reason = |result: Result<Applied, ReceiveError>| result.unwrap_err().to_string();
-    assert!(reason(snapshot(layout(53, 1, 0), &[2, 0])).contains("exceed the cell"));
-    assert!(reason(snapshot(layout(0x80, 0, 0), &[2, 0])).contains("cell gaps: ends early"));
-    assert!(reason(snapshot(layout(53, 0, 0), &[2, 0, 0])).contains("bytes after"));
-    assert!(reason(snapshot(layout(53, 0, 0), &[4, 0, 0])).contains("does not fit the number of points"));
-    assert!(reason(snapshot(layout(53, 0, 0), &[2])).contains("values: ends early"));
-    let mut bad = layout(53, 0, 0);
-    bad[8] = 9;
-    assert!(reason(snapshot(bad, &[2, 0])).contains("local bits"));
-    let mut bad = layout(53, 0, 0);
-    bad[0..4].copy_from_slice(&f32::NAN.to_le_bytes());
-    assert!(reason(snapshot(bad, &[2, 0])).contains("quantum_m is NaN"));
-
-    // With 5 local bits a cell has 48 bits: the last one there is, and the first beyond.
-    let with_cell = |cell: [u8; 7]| {
-        let mut out = layout(53, 0, 0)[..24].to_vec();
-        out[8] = 5;
-        out.extend([2, 0, 2, 0, 14]);
-        out.extend(cell);
-        out.extend([2, 0, 2, 0, 2, 0]);
-        out.extend([0, 0, 0, 0]);
-        out
+    let with = |layout: &[u8], at: usize, bytes: &[u8]| {
+        let mut out = layout.to_vec();
+        out.splice(at..at + bytes.len(), bytes.iter().copied());
+        reason(snapshot(&out, one))
     };
-    let last = [0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0x3f];
-    assert_eq!(snapshot(with_cell(last), &[2, 0]), Ok(Applied::NewLayout));
-    let beyond = [0x80, 0x80, 0x80, 0x80, 0x80, 0x80, 0x40];
-    assert!(reason(snapshot(with_cell(beyond), &[2, 0])).contains("leave the 21-bit grid"));
+    assert!(with(layout, 0, &f32::NAN.to_le_bytes()).contains("quantum_m is NaN"));
+    assert!(with(layout, 8, &[9]).contains("local bits"));
+    assert!(with(layout, 9, &[0x80, 0]).contains("shortest form"));
+    assert!(with(layout, 23, &[2]).contains("layout: ends early"), "two points");
+    // The first choices: a gap of nine bytes, all of which say that there are more.
+    assert!(reason(snapshot(&[&layout[..25], &[0; 9]].concat(), one)).contains("cell gaps: are no numbers"));
+    assert!(reason(snapshot(&[layout, &[0; 5]].concat(), one)).contains("layout: has bytes after"));
+    assert!(reason(snapshot(layout, &[one, &[0; 5]].concat())).contains("values: have bytes after"));
+    assert!(reason(snapshot(layout, &[0xff; 9])).contains("values: are none"));
 
     // One site of ten is cut.
-    let with_cuts = |cuts: &[u8]| {
-        let mut out = layout(53, 0, 0);
-        out.truncate(out.len() - 4);
-        out.extend(cuts);
-        snapshot(out, &[2, 0])
-    };
-    assert_eq!(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 1, 2, 9, 2, 1, 2, 0]), Ok(Applied::NewLayout));
-    assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 1, 2, 10, 2, 1, 2, 0])).contains("does not exist"));
-    assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 1, 2, 9, 2, 0, 2, 0])).contains("cuts nothing"));
-    assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 0, 0, 0, 0])).contains("a set has none"));
+    let cut = SiteCut { site: 9, mask: 0x8001 };
+    let (layout, _) = good(vec![SetCuts { instance: 0, sites: 10, fingerprint: 7, cuts: vec![cut] }]);
+    assert_eq!(snapshot(&layout, one), Ok(Applied::NewLayout));
+    assert!(with(&layout, 26, &[9]).contains("does not exist"), "of nine sites");
+    assert!(with(&layout, 31, &[0]).contains("a set has none"));
     assert!(
-        reason(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 1, 4, 9, 0, 2, 1, 2, 0]))
-            .contains("more than there are cuts")
+        with(&layout, 31, &[2]).contains("layout: ends early") || with(&layout, 31, &[2]).contains("cut")
     );
-    assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9])).contains("ends early"));
-    assert!(reason(with_cuts(&[1, 0, 10, 9, 9, 9, 9, 1, 2, 9, 2, 1])).contains("ends early"));
     let over = [0x80, 0x80, 0x80, 0x80, 0x10];
-    assert!(reason(with_cuts(&[&[1][..], &over, &[10, 9, 9, 9, 9, 1]].concat())).contains("exceeds 32 bits"));
-    assert!(reason(with_cuts(&[&[1, 0][..], &over, &[9, 9, 9, 9, 1]].concat())).contains("exceed 32 bits"));
+    assert!(with(&layout, 25, &over).contains("exceeds 32 bits"));
+    assert!(with(&layout, 26, &over).contains("exceed 32 bits"));
 
     let delta = |payload: &[u8]| holding().receive(&seal(FrameKind::Delta, 0, 12, payload));
-    assert!(matches!(delta(&[2, 1, 2, 5, 2, 9]), Ok(Applied::Changes(list)) if list.len() == 1));
-    assert!(reason(delta(&[0, 1, 2, 5, 2, 9])).contains("is the frame's own"));
-    assert!(reason(delta(&[13, 1, 2, 5, 2, 9])).contains("is negative"));
-    assert!(reason(delta(&[2, 0, 0, 0])).contains("are none"));
-    assert!(reason(delta(&[2, 1, 2, 5, 2, 0])).contains("leave a value as it was"));
-    assert!(reason(delta(&[2, 1, 2, 5, 2, 9, 0])).contains("bytes after"));
-    assert!(reason(delta(&[2, 1, 4, 5, 0, 2, 9])).contains("more than there are changes"));
-    assert!(reason(delta(&[2, 1, 8, 0xff, 0xff, 0xff, 1, 2, 9])).contains("does not exist"));
-    assert!(reason(delta(&[2, 1, 4, 0x85, 0, 2, 9])).contains("shortest form"));
-    assert!(reason(delta(&[3, 1, 2, 5, 2, 9])).contains("ask for a snapshot"));
+    let good = payload(&SAMPLE.2);
+    assert!(matches!(delta(&good), Ok(Applied::Changes(list)) if list.len() > 100));
+    let with = |at: usize, byte: u8| {
+        let mut bytes = good.clone();
+        bytes[at] = byte;
+        reason(delta(&bytes))
+    };
+    assert!(with(0, 0).contains("is the frame's own"));
+    assert!(with(0, 13).contains("is negative"));
+    assert!(with(0, 3).contains("ask for a snapshot"));
+    assert!(with(1, 0).contains("step: is 0"));
+    assert!(with(2, 129).contains("share: exceeds 2"));
+    assert!(reason(delta(&[2])).contains("step: ends early"));
+    assert!(reason(delta(&[&good[..], &[1; 5]].concat())).contains("bytes after"));
+    assert!(reason(delta(&good[..good.len() / 2])).contains("changes: end early"));
+    assert!(reason(delta(&[2, 1, 58])).contains("changes: end early"));
+    assert!(reason(delta(&[2, 1, 58, 0xff, 0xff, 0xff, 0xff])).contains("changes: are none"));
 }

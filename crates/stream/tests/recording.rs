@@ -61,7 +61,7 @@ const STEP_US: u64 = 66_667;
 
 static SAMPLE: LazyLock<Sample> = LazyLock::new(|| {
     let mut store = cloud::hall(3, 400);
-    let config = PublisherConfig { first_group: 7, deltas_per_group: 5 };
+    let config = PublisherConfig { first_group: 7, deltas_per_group: 5, ..Default::default() };
     let mut publisher = Publisher::new(header(0).scene_hash, config);
     let (mut recorder, mut bytes) = Recorder::new(&header(24 * STEP_US)).unwrap();
     let mut states = Vec::new();
@@ -71,7 +71,7 @@ static SAMPLE: LazyLock<Sample> = LazyLock::new(|| {
             store = cloud::moved(&store, step, 0.05);
         }
         let time_us = step * STEP_US;
-        if let Some(frame) = publisher.publish(&store).unwrap() {
+        if let Some(frame) = publisher.publish(&store) {
             bytes.extend(recorder.frame(time_us, &frame.bytes).unwrap());
             states.push((time_us, store.clone()));
         }

@@ -95,7 +95,7 @@ impl<'a> Points<'a> {
         let cuts = find_cuts(self.scene, &self.pose, &self.tracer, layout, &|done| bar.set(done as u64));
         drop(bar);
         publisher.set_cuts(layout.clone(), cuts);
-        let frame = publisher.publish(&store)?.context("the points make no snapshot")?;
+        let frame = publisher.publish(&store).context("the points make no snapshot")?;
         let duration_us = microseconds(scene_seconds(self.scene));
         let header = RecordingHeader { scene_hash: hash, name: name.to_owned(), duration_us };
         let (mut recorder, mut bytes) = Recorder::new(&header)?;

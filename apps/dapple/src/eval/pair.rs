@@ -5,7 +5,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use dapple_scene::{CameraPath, Pose, Scene};
 use dapple_server::{Progress, Server, ServerConfig};
-use dapple_stream::{Recorder, RecordingHeader};
+use dapple_stream::{Precision, PublisherConfig, Recorder, RecordingHeader};
 use dapple_trace::Tracer;
 use dapple_trace::psao::generate::{GenerateParams, generate_points};
 use dapple_trace::psao::update::{ConvexVolume, StepInput, UpdateParams};
@@ -24,6 +24,8 @@ const MAX_KEPT_POINTS: usize = 6_000_000;
 pub(super) struct Start {
     pub(super) points_per_m2: f32,
     pub(super) update: UpdateParams,
+    /// What values may be off, 255ths.
+    pub(super) tolerance: u8,
     pub(super) seed: u32,
 }
 
@@ -35,9 +37,9 @@ impl Start {
             update: UpdateParams {
                 rays: settings.point_rays,
                 radius_m: stage.radius_m,
-                threshold: settings.threshold,
                 rays_still: settings.step.rays_still,
             },
+            tolerance: settings.threshold,
             seed: settings.seed,
         }
     }
@@ -48,7 +50,9 @@ impl Start {
             seed: self.seed,
             ..GenerateParams::default()
         };
-        ServerConfig { generate, update: self.update, ..ServerConfig::default() }
+        let precision = Precision { tolerance: self.tolerance, ..Precision::default() };
+        let publish = PublisherConfig { precision, ..PublisherConfig::default() };
+        ServerConfig { generate, update: self.update, publish, ..ServerConfig::default() }
     }
 
     /// Whether a server would refuse these settings; quick.

@@ -227,12 +227,7 @@ impl Run<'_> {
             }
             let Some(samples) = &samples else { continue };
             bar.message(&format!("visibility, N = {points_per_m2}"));
-            let update = UpdateParams {
-                rays: visibility.point_rays,
-                radius_m,
-                threshold: visibility.threshold,
-                ..UpdateParams::default()
-            };
+            let update = UpdateParams { rays: visibility.point_rays, radius_m, ..UpdateParams::default() };
             let updater = Updater::new(scene, &pose, &tracer, points, update, &|_| ())?;
             bar.message(&format!("cuts, N = {points_per_m2}"));
             let cuts = find_cuts(scene, &rest_pose, &rest_tracer, updater.store().layout(), &|_| ());

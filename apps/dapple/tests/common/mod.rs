@@ -55,7 +55,7 @@ pub(crate) fn small(width: u32, height: u32) -> PictureParams {
 /// The frame that would carry a store: equal bytes mean stores that are equal to the bit.
 pub(crate) fn fingerprint(store: &PointStore) -> Arc<[u8]> {
     let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
-    publisher.publish(store).unwrap().unwrap().bytes
+    publisher.publish(store).unwrap().bytes
 }
 
 /// Runs `work` in a pool of so many threads.

@@ -307,7 +307,7 @@ fn a_look_up_that_fails_is_left_out_until_other_points_come() {
     let scene = atrium();
     let mut viewer = viewer(&gpu, &scene);
     let mut publisher = Publisher::new(scene.hash().0, PublisherConfig::default());
-    let mut publish = |store: &PointStore| publisher.publish(store).expect("memory suffices").expect("news");
+    let mut publish = |store: &PointStore| publisher.publish(store).expect("news");
     let with = |method| DrawOptions {
         view: DebugView::Visibility,
         method,

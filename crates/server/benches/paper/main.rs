@@ -6,9 +6,8 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use clap::Parser;
 use dapple_scene::{NoFiles, Scene, builtin};
-use dapple_store::points::{Change, PointStore};
 use dapple_stream::cells::{CellCodec, CellLimits, CellPublisher, CellSubscriber};
-use dapple_stream::{Publisher, PublisherConfig};
+use dapple_stream::{Precision, Publisher, PublisherConfig};
 use dapple_trace::Tracer;
 use dapple_trace::psao::generate::{GenerateParams, generate_points};
 use dapple_trace::psao::paper::{PaperCounts, PaperParams, PaperUpdater, extended_view};
@@ -88,12 +87,12 @@ fn measure(name: &str, scene: &Scene, arguments: &Arguments) -> Result<()> {
     let mut tracer = Tracer::new(scene, &pose);
     let generate = GenerateParams { points_per_m2: arguments.points, ..GenerateParams::default() };
     let points = generate_points(scene, &pose, &tracer, &generate, &|_| ())?;
-    let update = UpdateParams { rays: arguments.rays, threshold: 0, ..UpdateParams::default() };
+    let update = UpdateParams { rays: arguments.rays, ..UpdateParams::default() };
     let mut updater = Updater::new(scene, &pose, &tracer, points, update, &|_| ())?;
-    let mut own = Publisher::new(scene.hash().0, PublisherConfig::default());
-    let mut store: PointStore = updater.store().clone();
-    own.publish(&store)?;
-    let own_join = own.join()?.map_or(0, |frame| frame.bytes.len());
+    let precision = Precision { tolerance: arguments.threshold, ..Precision::default() };
+    let mut own = Publisher::new(scene.hash().0, PublisherConfig { precision, ..PublisherConfig::default() });
+    own.publish(updater.store());
+    let own_join = own.join().map_or(0, |frame| frame.bytes.len());
     let mut own_bytes = 0;
 
     let variant = |name, margin_degrees, codec, still_bending: bool| -> Result<Variant> {
@@ -123,7 +122,7 @@ fn measure(name: &str, scene: &Scene, arguments: &Arguments) -> Result<()> {
     let join = first.publisher.join(first.paper.table())?;
     println!(
         "{name}: {} points, {} in no cell; join {} kB as the paper has it, {} kB ours (without cuts)",
-        store.layout().len(),
+        updater.store().layout().len(),
         first.paper.unplaced(),
         join.bytes.len() / 1000,
         own_join / 1000,
@@ -151,13 +150,7 @@ fn measure(name: &str, scene: &Scene, arguments: &Arguments) -> Result<()> {
                 variant.subscriber.receive(&frame.bytes)?;
             }
         }
-        let values = (0..).zip(updater.store().visibility());
-        let changes: Vec<Change> = values
-            .filter(|&(i, &v)| v.abs_diff(store.visibility()[i as usize]) > arguments.threshold)
-            .map(|(point, &visibility)| Change { point, visibility })
-            .collect();
-        store.apply(&changes)?;
-        own_bytes += own.publish(&store)?.map_or(0, |frame| frame.bytes.len());
+        own_bytes += own.publish(updater.store()).map_or(0, |frame| frame.bytes.len());
     }
     let kbit_per_s = |bytes: usize| bytes as f64 * 8e-3 / (f64::from(steps) / arguments.hz);
     for Variant { name, paper, subscriber, bytes, counts, .. } in &variants {

@@ -14,7 +14,8 @@ use anyhow::{Context, Result, bail};
 use clap::Parser;
 use dapple_scene::builtin::{self, BUILTINS};
 use dapple_scene::{NoFiles, Pose, Scene};
-use dapple_stream::{Publisher, PublisherConfig};
+use dapple_server::ServerConfig;
+use dapple_stream::Publisher;
 use dapple_trace::Tracer;
 use dapple_trace::psao::generate::{GenerateParams, GeneratedPoints, generate_points};
 use dapple_trace::psao::update::{StepInput, UpdateParams, Updater};
@@ -116,8 +117,8 @@ fn measure(name: &str, scene: &Scene, arguments: &Arguments) -> Result<Value> {
     let count = points.anchors.len();
     let params = UpdateParams::default();
     let mut updater = Updater::new(scene, &pose, &tracer, points, params, &|_| ())?;
-    let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
-    publisher.publish(updater.store())?;
+    let mut publisher = Publisher::new([0; 32], ServerConfig::default().publish);
+    publisher.publish(updater.store());
 
     let mut steps = Vec::new();
     for step in 1..=arguments.steps {
@@ -134,8 +135,8 @@ fn measure(name: &str, scene: &Scene, arguments: &Arguments) -> Result<Value> {
             movers: movers(&before, &pose),
             traced: report.counts.traced(),
             rays: report.counts.rays(),
-            changed: report.changes.len(),
-            bytes: frame?.map_or(0, |frame| frame.bytes.len()),
+            changed: publisher.changed() as usize,
+            bytes: frame.map_or(0, |frame| frame.bytes.len()),
         });
     }
     let bytes = updater.bytes_per_point();

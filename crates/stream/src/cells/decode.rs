@@ -8,8 +8,7 @@ use dapple_store::cells::{
 };
 use glam::Vec3;
 
-use super::{BUCKET_BYTES, CELL_BYTES, CellCodec, GRID_BYTES, INDEX_BYTES, TAG};
-use crate::codec::section::expand;
+use super::{BUCKET_BYTES, CELL_BYTES, CellCodec, GRID_BYTES, INDEX_BYTES, TAG, ZSTD_MAGIC};
 use crate::codec::varint::Reader;
 use crate::codec::{DecodeError, FrameKind, Limits, open};
 
@@ -269,4 +268,18 @@ fn read_indices(reader: &mut Reader<'_>, end: u32) -> Result<Vec<u32>, DecodeErr
         next = index + 1;
     }
     Ok(indices)
+}
+
+/// Expands one Zstandard frame without its magic number to exactly `raw_bytes`. Memory grows with what really comes out, never
+/// beyond the stated size by more than a window of that size.
+fn expand(coded: &[u8], raw_bytes: usize) -> Option<Vec<u8>> {
+    use std::io::Read;
+    let whole = std::io::BufReader::new(ZSTD_MAGIC.as_slice().chain(coded));
+    let mut decoder = zstd::stream::read::Decoder::with_buffer(whole).ok()?.single_frame();
+    decoder.window_log_max(raw_bytes.next_power_of_two().max(1024).ilog2()).ok()?;
+    let mut out = Vec::new();
+    let read = decoder.by_ref().take(raw_bytes as u64 + 1).read_to_end(&mut out).ok()?;
+    let mut rest = [0];
+    let is_last = decoder.finish().read(&mut rest).ok()? == 0;
+    (read == raw_bytes && is_last).then_some(out)
 }

@@ -2,9 +2,9 @@
 
 use dapple_store::cells::{CellChanges, CellTable};
 
-use super::{BUCKET_BYTES, CELL_BYTES, CellCodec, INDEX_BYTES, TAG};
+use super::{BUCKET_BYTES, CELL_BYTES, CellCodec, INDEX_BYTES, TAG, ZSTD_MAGIC};
 use crate::codec::varint::write_varint;
-use crate::codec::{FrameKind, ZSTD_MAGIC, seal};
+use crate::codec::{FrameKind, seal};
 
 /// [Neff2023] sec. 4.
 const LEVEL: i32 = 15;

@@ -4,15 +4,16 @@
 //! turns back into the same table. The measured baseline; see `README.md`.
 
 mod decode;
-#[cfg(feature = "zstd")]
 mod encode;
 
 pub use decode::{CellError, CellLimits, CellSubscriber};
-#[cfg(feature = "zstd")]
 pub use encode::{CellFrame, CellPublisher};
 
 /// First bytes of every payload, which keep it apart from those of `docs/wire.md`.
 const TAG: [u8; 4] = *b"CELL";
+
+/// The start of every Zstandard frame, which bodies leave out.
+const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
 /// Bytes of a bucket: eight entries of two words.
 const BUCKET_BYTES: usize = 64;

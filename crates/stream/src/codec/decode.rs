@@ -1,22 +1,14 @@
 //! Payloads → layouts, values and changes. Total: any bytes give a value or an error, within [`Limits`].
 
 use dapple_store::charts::{Cuts, SetCuts, SiteCut};
-use dapple_store::points::{MAX_POINTS, PackedNormal, PointLayout, PointSet, morton_decode};
+use dapple_store::points::{MAX_POINTS, PointLayout, PointSet};
 use glam::Vec3;
 
-use super::plane::{Plane, reference};
-use super::section::unpack;
+use super::columns::{CutColumns, PointColumns};
+use super::entropy::{self, Coder};
+use super::values::{Guide, MOST_FOLLOW, Near, Scale, Scratch, ValueChange, code_changes, code_values};
 use super::varint::Reader;
-use super::{DecodeError, Limits, unzigzag};
-
-/// Most bytes of a varint below 2⁶³.
-const MAX_GAP_BYTES: usize = 9;
-
-/// Most bytes of a varint below 2³².
-const MAX_SITE_GAP_BYTES: usize = 5;
-
-/// Most bytes of a varint below 2²⁴.
-const MAX_POINT_GAP_BYTES: usize = 4;
+use super::{DecodeError, Limits};
 
 /// The parts of a snapshot, the large ones still encoded.
 pub(crate) struct SnapshotParts<'a> {
@@ -31,6 +23,14 @@ pub(crate) struct DeltaParts<'a> {
     changes: Reader<'a>,
 }
 
+/// What the layout part of a snapshot says.
+pub(crate) struct DecodedLayout {
+    pub(crate) layout: PointLayout,
+    pub(crate) cuts: Cuts,
+    /// Bits of a coordinate within its cell.
+    pub(crate) local_bits: u32,
+}
+
 pub(crate) fn parse_snapshot(payload: &[u8]) -> Result<SnapshotParts<'_>, DecodeError> {
     let mut reader = Reader::new(payload);
     let scene_hash = reader.array("scene hash")?;
@@ -40,7 +40,7 @@ pub(crate) fn parse_snapshot(payload: &[u8]) -> Result<SnapshotParts<'_>, Decode
     Ok(SnapshotParts { scene_hash, layout, values })
 }
 
-pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<(PointLayout, Cuts), DecodeError> {
+pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<DecodedLayout, DecodeError> {
     let bad = |part, reason| DecodeError::Malformed { part, reason };
     let mut reader = Reader::new(bytes);
     let quantum_m = reader.f32("layout lengths")?;
@@ -50,62 +50,62 @@ pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<(PointLayou
         return Err(bad("layout local bits", "exceed 8"));
     }
     let (mut sets, counts) = decode_sets(&mut reader, limits)?;
-    let total: usize = counts.iter().sum();
-
-    let normals_x = unpack(&mut reader, "normals", total, total)?;
-    let normals_y = unpack(&mut reader, "normals", total, total)?;
-    let cell_gaps = unpack(&mut reader, "cell gaps", total, MAX_GAP_BYTES * total)?;
-    let along_0 = unpack(&mut reader, "coordinates", total, total)?;
-    let along_1 = unpack(&mut reader, "coordinates", total, total)?;
-    let across = unpack(&mut reader, "coordinates", total, total)?;
-    let cuts = decode_cuts(&mut reader, limits)?;
-    if !reader.is_empty() {
-        return Err(bad("layout", "has bytes after its last section"));
-    }
-    let local_mask = (1u32 << local_bits) - 1;
-    if [&along_0, &along_1, &across].into_iter().flatten().any(|&c| u32::from(c) > local_mask) {
-        return Err(bad("coordinates", "exceed the cell"));
-    }
-
-    let mut gaps = Reader::new(&cell_gaps);
-    let mut first = 0;
+    let (mut cut_sets, cut_counts) = decode_cut_sets(&mut reader, limits)?;
+    // No more room is made than these bytes can well fill.
+    let most = 8 * reader.len() + 64;
+    let mut coded = entropy::Reader::new(reader.take(reader.len(), "layout")?);
+    let ended = bad("layout", "ends early");
+    let mut columns = PointColumns::new(local_bits);
     for (set, count) in sets.iter_mut().zip(counts) {
-        set.normals = Vec::with_capacity(count);
-        set.positions = Vec::with_capacity(count);
-        let mut normal = [0u8; 2];
-        for i in first..first + count {
-            normal[0] = normal[0].wrapping_add(unzigzag(normals_x[i]));
-            normal[1] = normal[1].wrapping_add(unzigzag(normals_y[i]));
-            set.normals.push(PackedNormal(normal));
-        }
-        let mut cell = 0u64;
-        for i in 0..count {
-            cell = gaps
-                .varint("cell gaps")?
-                .checked_add(cell)
-                .filter(|&cell| cell < 1 << (63 - 3 * local_bits))
-                .ok_or(bad("cell gaps", "leave the 21-bit grid"))?;
-            let corner = morton_decode(cell << (3 * local_bits));
-            let plane = Plane::new(set.normals[i]);
-            let at = first + i;
-            let mut position = corner;
-            position[plane.along[0]] |= u32::from(along_0[at]);
-            position[plane.along[1]] |= u32::from(along_1[at]);
-            let along = plane.along.map(|axis| position[axis]);
-            let predicted = plane.predict(reference(&set.positions, &set.normals, i), along);
-            position[plane.across] |= predicted.wrapping_add(u32::from(across[at])) & local_mask;
+        set.positions = Vec::with_capacity(count.min(most));
+        set.normals = Vec::with_capacity(count.min(most));
+        columns.begin_set();
+        for _ in 0..count {
+            let before = (&set.positions[..], &set.normals[..]);
+            let (position, normal) = columns.code(&mut coded, before, None).map_err(|(part, reason)| {
+                if coded.is_exhausted() { ended.clone() } else { bad(part, reason) }
+            })?;
+            if coded.is_exhausted() {
+                return Err(ended);
+            }
             set.positions.push(position);
+            set.normals.push(normal);
         }
-        first += count;
+        set.positions.shrink_to_fit();
+        set.normals.shrink_to_fit();
     }
-    if !gaps.is_empty() {
-        return Err(bad("cell gaps", "are more than there are points"));
+    let mut columns = CutColumns::new();
+    for (set, count) in cut_sets.iter_mut().zip(cut_counts) {
+        columns.begin_set();
+        set.cuts = Vec::with_capacity(count.min(most));
+        for _ in 0..count {
+            let cut = columns.code(&mut coded, SiteCut { site: 0, mask: 0 }).map_err(|(part, reason)| {
+                if coded.is_exhausted() { ended.clone() } else { bad(part, reason) }
+            })?;
+            if coded.is_exhausted() {
+                return Err(ended);
+            }
+            if cut.site >= set.sites {
+                return Err(bad("cut gaps", "name a site that does not exist"));
+            }
+            set.cuts.push(cut);
+        }
+        set.cuts.shrink_to_fit();
     }
-    Ok((PointLayout::new(quantum_m, spacing_m, sets)?, cuts))
+    if !coded.is_complete() {
+        return Err(bad("layout", "has bytes after its end"));
+    }
+    // A mask of 0 is found here.
+    let cuts = Cuts::new(cut_sets).map_err(|error| bad("cut masks", error.reason))?;
+    let layout = PointLayout::new(quantum_m, spacing_m, sets)?;
+    Ok(DecodedLayout { layout, cuts, local_bits })
 }
 
-/// The cuts that close a layout.
-fn decode_cuts(reader: &mut Reader<'_>, limits: &Limits) -> Result<Cuts, DecodeError> {
+/// The table of sets of cuts, still without cuts, and how many each has: together within the limits.
+fn decode_cut_sets(
+    reader: &mut Reader<'_>,
+    limits: &Limits,
+) -> Result<(Vec<SetCuts>, Vec<usize>), DecodeError> {
     let part = "cuts";
     let bad = |reason| DecodeError::Malformed { part, reason };
     let count = reader.varint(part)?;
@@ -137,31 +137,7 @@ fn decode_cuts(reader: &mut Reader<'_>, limits: &Limits) -> Result<Cuts, DecodeE
         counts.push(cuts as usize);
         sets.push(SetCuts { instance, sites, fingerprint, cuts: Vec::new() });
     }
-    let total = total as usize;
-    let gaps = unpack(reader, "cut gaps", total, MAX_SITE_GAP_BYTES * total)?;
-    let low = unpack(reader, "cut masks", total, total)?;
-    let high = unpack(reader, "cut masks", total, total)?;
-    let mut gaps = Reader::new(&gaps);
-    let mut masks = low.iter().zip(&high).map(|(&low, &high)| u16::from_le_bytes([low, high]));
-    for (set, count) in sets.iter_mut().zip(counts) {
-        set.cuts = Vec::with_capacity(count);
-        let mut next = 0u64;
-        for mask in masks.by_ref().take(count) {
-            let site = next.saturating_add(gaps.varint("cut gaps")?);
-            if site >= u64::from(set.sites) {
-                return Err(DecodeError::Malformed {
-                    part: "cut gaps",
-                    reason: "name a site that does not exist",
-                });
-            }
-            next = site + 1;
-            set.cuts.push(SiteCut { site: site as u32, mask });
-        }
-    }
-    if !gaps.is_empty() {
-        return Err(DecodeError::Malformed { part: "cut gaps", reason: "are more than there are cuts" });
-    }
-    Cuts::new(sets).map_err(|error| bad(error.reason))
+    Ok((sets, counts))
 }
 
 /// The table of sets, still without points, and how many points each has: together within the limits.
@@ -193,17 +169,13 @@ fn decode_sets(reader: &mut Reader<'_>, limits: &Limits) -> Result<(Vec<PointSet
     Ok((sets, counts))
 }
 
-/// The values of `points` points.
-pub(crate) fn decode_values(bytes: &[u8], points: usize) -> Result<Vec<u8>, DecodeError> {
-    let mut reader = Reader::new(bytes);
-    let mut values = unpack(&mut reader, "values", points, points)?;
-    if !reader.is_empty() {
-        return Err(DecodeError::Malformed { part: "values", reason: "have bytes after their section" });
-    }
-    let mut last = u8::MAX;
-    for value in &mut values {
-        last = last.wrapping_add(unzigzag(*value));
-        *value = last;
+/// The values of a layout's points.
+pub(crate) fn decode_values(bytes: &[u8], layout: &PointLayout, near: &Near) -> Result<Vec<u8>, DecodeError> {
+    let bad = |reason| DecodeError::Malformed { part: "values", reason };
+    let mut reader = entropy::Reader::new(bytes);
+    let values = code_values(&mut reader, layout, near, |_| 0).map_err(bad)?;
+    if !reader.is_complete() {
+        return Err(bad("have bytes after their end"));
     }
     Ok(values)
 }
@@ -220,40 +192,44 @@ pub(crate) fn parse_delta(epoch: u64, payload: &[u8]) -> Result<DeltaParts<'_>, 
     Ok(DeltaParts { base_epoch, changes })
 }
 
-/// The changes of a delta for a store of `points` points: what to add, modulo 256, to which points. Indices
-/// strictly increase.
-pub(crate) fn decode_steps(parts: &DeltaParts<'_>, points: usize) -> Result<Vec<(u32, u8)>, DecodeError> {
+/// A guide for who reads: what it says does not count.
+struct Read;
+
+impl Guide for Read {
+    fn wants(&self, _: std::ops::Range<usize>) -> bool {
+        false
+    }
+
+    fn choose(&mut self, _: usize, _: i32, _: i32, _: i32) -> i32 {
+        0
+    }
+}
+
+/// What a delta changes of `values`, in order of point.
+pub(crate) fn decode_changes(
+    parts: &DeltaParts<'_>,
+    layout: &PointLayout,
+    near: &mut Near,
+    values: &[u8],
+    scratch: &mut Scratch,
+) -> Result<Vec<ValueChange>, DecodeError> {
     let bad = |part, reason| DecodeError::Malformed { part, reason };
     let mut reader = parts.changes;
-    let count = reader.varint("changes")?;
-    if count == 0 {
+    let scale = Scale { step: reader.byte("step")?, follow: reader.byte("share")? };
+    if scale.step == 0 {
+        return Err(bad("step", "is 0"));
+    }
+    if scale.follow > MOST_FOLLOW {
+        return Err(bad("share", "exceeds 2"));
+    }
+    let mut coded = entropy::Reader::new(reader.take(reader.len(), "changes")?);
+    let changes = code_changes(&mut coded, (layout, near), values, scale, &mut Read, scratch)
+        .ok_or(bad("changes", "end early"))?;
+    if changes.is_empty() {
         return Err(bad("changes", "are none"));
     }
-    if count > points as u64 {
-        return Err(bad("changes", "are more than there are points"));
+    if !coded.is_complete() {
+        return Err(bad("changes", "have bytes after their end"));
     }
-    let count = count as usize;
-    let gaps = unpack(&mut reader, "change gaps", count, MAX_POINT_GAP_BYTES * count)?;
-    let residuals = unpack(&mut reader, "change values", count, count)?;
-    if !reader.is_empty() {
-        return Err(bad("changes", "have bytes after their last section"));
-    }
-    let mut gaps = Reader::new(&gaps);
-    let mut next = 0u64;
-    let mut steps = Vec::with_capacity(count);
-    for residual in residuals {
-        let point = next.saturating_add(gaps.varint("change gaps")?);
-        if point >= points as u64 {
-            return Err(bad("change gaps", "name a point that does not exist"));
-        }
-        if residual == 0 {
-            return Err(bad("change values", "leave a value as it was"));
-        }
-        next = point + 1;
-        steps.push((point as u32, unzigzag(residual)));
-    }
-    if !gaps.is_empty() {
-        return Err(bad("change gaps", "are more than there are changes"));
-    }
-    Ok(steps)
+    Ok(changes)
 }

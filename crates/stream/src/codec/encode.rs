@@ -1,35 +1,35 @@
 //! Stores and changes → payloads. Deterministic: the same input gives the same bytes.
 
 use dapple_store::charts::Cuts;
-use dapple_store::points::{PointLayout, morton_code};
+use dapple_store::points::PointLayout;
 
-use super::plane::{Plane, reference};
-use super::section::pack;
+use super::columns::{CutColumns, PointColumns};
+use super::entropy::Writer;
+use super::values::{Fit, Goal, Near, Scratch, ValueChange, code_changes, code_values};
 use super::varint::write_varint;
-use super::zigzag;
-
-/// Zstandard level of the layout and of snapshot values: made once a group, sent to everyone.
-const SNAPSHOT_LEVEL: i32 = 15;
-
-/// Zstandard level of deltas: made every epoch. Measured (benches/codec.rs): higher levels gain at most 3 %.
-const DELTA_LEVEL: i32 = 1;
 
 /// Most bits of a coordinate within its cell: they are coded as one byte.
 const MAX_LOCAL_BITS: u32 = 8;
 
-/// The layout part of a snapshot with the cuts that belong to it, and how many of its bytes the cuts are.
-pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts) -> Result<(Vec<u8>, usize), std::io::Error> {
+/// The layout part of a snapshot with the cuts that belong to it.
+#[derive(Clone, Debug)]
+pub(crate) struct EncodedLayout {
+    pub(crate) bytes: Vec<u8>,
+    /// How many of these are cuts.
+    pub(crate) cut_bytes: usize,
+    /// Bits of a coordinate within its cell.
+    pub(crate) local_bits: u32,
+}
+
+/// The layout part of a snapshot.
+pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts) -> EncodedLayout {
     let local_bits = local_bits(layout);
-    let local_mask = (1u32 << local_bits) - 1;
     let mut out = Vec::new();
     out.extend(layout.quantum_m().to_le_bytes());
     out.extend(layout.spacing_m().to_le_bytes());
     out.push(local_bits as u8);
     write_varint(&mut out, layout.sets().len() as u64);
     let mut next_instance = 0;
-    let mut normals = [Vec::new(), Vec::new()];
-    let mut cell_gaps = Vec::new();
-    let mut locals = [Vec::new(), Vec::new(), Vec::new()];
     for set in layout.sets() {
         write_varint(&mut out, u64::from(set.instance) - next_instance);
         next_instance = u64::from(set.instance) + 1;
@@ -37,117 +37,76 @@ pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts) -> Result<(Vec<u8
             out.extend(component.to_le_bytes());
         }
         write_varint(&mut out, set.len() as u64);
-        let mut last_normal = [0u8; 2];
-        let mut last_cell = 0;
-        for (i, (&position, &normal)) in set.positions.iter().zip(&set.normals).enumerate() {
-            for axis in 0..2 {
-                normals[axis].push(zigzag(normal.0[axis].wrapping_sub(last_normal[axis])));
-            }
-            last_normal = normal.0;
-            let cell = morton_code(position) >> (3 * local_bits);
-            write_varint(&mut cell_gaps, cell - last_cell);
-            last_cell = cell;
-            let plane = Plane::new(normal);
-            let along = plane.along.map(|axis| position[axis]);
-            let predicted = plane.predict(reference(&set.positions, &set.normals, i), along);
-            let across = position[plane.across].wrapping_sub(predicted);
-            for (column, value) in locals.iter_mut().zip([along[0], along[1], across]) {
-                column.push((value & local_mask) as u8);
-            }
-        }
     }
-    let [n0, n1] = &normals;
-    let [l0, l1, l2] = &locals;
-    for section in [n0, n1, &cell_gaps, l0, l1, l2] {
-        pack(&mut out, section, SNAPSHOT_LEVEL)?;
-    }
-    let without_cuts = out.len();
-    encode_cuts(&mut out, cuts)?;
-    let cut_bytes = out.len() - without_cuts;
-    Ok((out, cut_bytes))
-}
-
-fn encode_cuts(out: &mut Vec<u8>, cuts: &Cuts) -> Result<(), std::io::Error> {
-    let sets = || cuts.sets().iter().filter(|set| !set.cuts.is_empty());
-    write_varint(out, sets().count() as u64);
+    let cut_sets: Vec<_> = cuts.sets().iter().filter(|set| !set.cuts.is_empty()).collect();
+    let before_cuts = out.len();
+    write_varint(&mut out, cut_sets.len() as u64);
     let mut next_instance = 0;
-    let mut gaps = Vec::new();
-    let mut masks = [Vec::new(), Vec::new()];
-    for set in sets() {
-        write_varint(out, u64::from(set.instance) - next_instance);
+    for set in &cut_sets {
+        write_varint(&mut out, u64::from(set.instance) - next_instance);
         next_instance = u64::from(set.instance) + 1;
-        write_varint(out, u64::from(set.sites));
+        write_varint(&mut out, u64::from(set.sites));
         out.extend(set.fingerprint.to_le_bytes());
-        write_varint(out, set.cuts.len() as u64);
-        let mut next = 0;
-        for cut in &set.cuts {
-            write_varint(&mut gaps, u64::from(cut.site - next));
-            next = cut.site + 1;
-            for (column, byte) in masks.iter_mut().zip(cut.mask.to_le_bytes()) {
-                column.push(byte);
-            }
+        write_varint(&mut out, set.cuts.len() as u64);
+    }
+    let table_bytes = out.len() - before_cuts;
+    let mut writer = Writer::new(out);
+    let mut columns = PointColumns::new(local_bits);
+    for set in layout.sets() {
+        columns.begin_set();
+        for i in 0..set.len() {
+            let (positions, normals) = (&set.positions, &set.normals);
+            let place = Some((positions[i], normals[i]));
+            columns.code(&mut writer, (&positions[..i], &normals[..i]), place).expect("only reading fails");
         }
     }
-    let [low, high] = &masks;
-    for section in [&gaps, low, high] {
-        pack(out, section, SNAPSHOT_LEVEL)?;
+    let before_cuts = writer.bytes();
+    let mut columns = CutColumns::new();
+    for set in cut_sets {
+        columns.begin_set();
+        for cut in &set.cuts {
+            columns.code(&mut writer, *cut).expect("only reading fails");
+        }
     }
-    Ok(())
+    let bytes = writer.finish();
+    let cut_bytes = table_bytes + bytes.len().saturating_sub(before_cuts);
+    EncodedLayout { bytes, cut_bytes, local_bits }
 }
 
-/// The payload of a snapshot; `layout` is what [`encode_layout`] gave for the layout of `visibility`.
+/// The payload of a snapshot; `encoded` is what [`encode_layout`] gave for `layout`, `visibility` one value a point.
 pub(crate) fn snapshot_payload(
     scene_hash: &[u8; 32],
-    layout: &[u8],
+    encoded: &EncodedLayout,
+    (layout, near): (&PointLayout, &Near),
     visibility: &[u8],
-) -> Result<Vec<u8>, std::io::Error> {
-    let mut out = Vec::with_capacity(layout.len() + visibility.len() / 2 + 64);
+) -> Vec<u8> {
+    let mut out = Vec::with_capacity(encoded.bytes.len() + visibility.len() / 2 + 64);
     out.extend(scene_hash);
-    write_varint(&mut out, layout.len() as u64);
-    out.extend(layout);
-    let mut last = u8::MAX;
-    let residuals: Vec<u8> = visibility
-        .iter()
-        .map(|&value| zigzag(value.wrapping_sub(std::mem::replace(&mut last, value))))
-        .collect();
-    pack(&mut out, &residuals, SNAPSHOT_LEVEL)?;
-    Ok(out)
+    write_varint(&mut out, encoded.bytes.len() as u64);
+    out.extend(&encoded.bytes);
+    let mut writer = Writer::new(out);
+    code_values(&mut writer, layout, near, |point| visibility[point]).expect("only reading fails");
+    writer.finish()
 }
 
-/// The payload of a delta from `old` to `new` visibility, or nothing if they are equal.
-/// `epochs_back` is the distance from the frame's epoch to that of `old`, at least 1.
+/// The payload of a delta that brings `held` to within the goal, and what it changes. `epochs_back` is the distance from the
+/// frame's epoch to that of `held`, at least 1.
 pub(crate) fn delta_payload(
     epochs_back: u64,
-    old: &[u8],
-    new: &[u8],
-) -> Result<Option<Vec<u8>>, std::io::Error> {
-    /// Equal stretches of this many points are skipped at once.
-    const STRIDE: usize = 64;
-    let mut gaps = Vec::new();
-    let mut residuals = Vec::new();
-    let mut next = 0;
-    for (stretch, (old, new)) in old.chunks(STRIDE).zip(new.chunks(STRIDE)).enumerate() {
-        if old == new {
-            continue;
-        }
-        for (i, (&old, &new)) in old.iter().zip(new).enumerate() {
-            if old != new {
-                let point = stretch * STRIDE + i;
-                write_varint(&mut gaps, (point - next) as u64);
-                next = point + 1;
-                residuals.push(zigzag(new.wrapping_sub(old)));
-            }
-        }
-    }
-    if residuals.is_empty() {
-        return Ok(None);
-    }
+    (layout, near): (&PointLayout, &mut Near),
+    held: &[u8],
+    mut goal: Goal<'_>,
+    fit: &mut Fit,
+    scratch: &mut Scratch,
+) -> (Vec<u8>, Vec<ValueChange>) {
     let mut out = Vec::new();
     write_varint(&mut out, epochs_back);
-    write_varint(&mut out, residuals.len() as u64);
-    pack(&mut out, &gaps, DELTA_LEVEL)?;
-    pack(&mut out, &residuals, DELTA_LEVEL)?;
-    Ok(Some(out))
+    let scale = goal.scale(fit);
+    out.extend([scale.step, scale.follow]);
+    let mut writer = Writer::new(out);
+    let changes = code_changes(&mut writer, (layout, near), held, scale, &mut goal, scratch);
+    fit.learn(&goal);
+    (writer.finish(), changes.unwrap_or_default())
 }
 
 /// Bits of a coordinate within its cell, so that a cell is about as large as the points are apart: then most

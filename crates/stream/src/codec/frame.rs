@@ -7,7 +7,7 @@ use super::{DecodeError, Limits};
 pub const MAGIC: [u8; 2] = [0x44, 0x50];
 
 /// Version of the format that this code writes, and the only one it reads.
-pub const VERSION: u8 = 2;
+pub const VERSION: u8 = 3;
 
 /// Bytes before the numbers of the header: magic, version, kind.
 const FIXED_BYTES: usize = 4;

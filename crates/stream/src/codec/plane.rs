@@ -46,15 +46,16 @@ impl Plane {
     }
 }
 
-/// The point that the prediction for point `i` of a set starts from: the last of up to [`REACH`] before it with
-/// its normal, else the last one, else the origin. Only looks at positions before `i`.
-pub(crate) fn reference(positions: &[[u32; 3]], normals: &[PackedNormal], i: usize) -> [u32; 3] {
-    let same = (i.saturating_sub(REACH)..i).rev().find(|&j| normals[j] == normals[i]);
-    same.or(i.checked_sub(1)).map_or([0; 3], |j| positions[j])
+/// The point that the prediction for the point after those given starts from: the last of up to [`REACH`] with its normal, else
+/// the last one, else the origin.
+pub(crate) fn reference(positions: &[[u32; 3]], normals: &[PackedNormal], normal: PackedNormal) -> [u32; 3] {
+    let first = normals.len().saturating_sub(REACH);
+    let same = normals[first..].iter().rposition(|other| *other == normal).map(|at| first + at);
+    same.or(normals.len().checked_sub(1)).map_or([0; 3], |at| positions[at])
 }
 
 /// The direction of a packed normal, scaled so that the sum of its components' sizes is 127.
-fn direction(normal: PackedNormal) -> [i64; 3] {
+pub(crate) fn direction(normal: PackedNormal) -> [i64; 3] {
     let component = |b: u8| i64::from(b.min(254)) - 127;
     let (x, y) = (component(normal.0[0]), component(normal.0[1]));
     let z = 127 - x.abs() - y.abs();

@@ -3,11 +3,13 @@
 use std::sync::{Arc, OnceLock};
 
 use dapple_store::charts::Cuts;
-use dapple_store::points::{PointLayout, PointStore};
+use dapple_store::points::{Change, PointLayout, PointStore};
 
-use crate::codec::{FrameKind, delta_payload, encode_layout, seal, snapshot_payload};
+use crate::codec::{
+    EncodedLayout, Fit, FrameKind, Goal, Near, Scratch, delta_payload, encode_layout, seal, snapshot_payload,
+};
 
-/// How a [`Publisher`] numbers and cuts its groups.
+/// How a [`Publisher`] numbers and cuts its groups, and how exact its deltas are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PublisherConfig {
     /// Number of the first group. Must exceed every group number that subscribers of this stream can have seen,
@@ -18,6 +20,29 @@ pub struct PublisherConfig {
     /// only a new layout or [`Publisher::start_group`] does. Relays that keep whole groups for late joiners need
     /// it; who asks [`Publisher::join`] for each joiner does not.
     pub deltas_per_group: u32,
+    /// How exact deltas are.
+    pub precision: Precision,
+}
+
+/// How exact deltas are, in 255ths of visibility. Snapshots are exact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Precision {
+    /// What subscribers hold is at most this far from what was published, always: a change that leaves a point within is not
+    /// sent. Default 0: everything is sent exactly. At most 127; more is taken as that.
+    pub tolerance: u8,
+    /// What is sent is a multiple of this beside what is expected: larger is shorter, and less exact within the tolerance.
+    /// 1 … 2 `tolerance` + 1, more is taken as that; 0 (default) is the smaller of 2 `tolerance` and 8, or the tolerance if
+    /// that is more (`README.md` has the measurements).
+    pub step: u8,
+}
+
+impl Precision {
+    /// Tolerance and step within their ranges.
+    fn in_range(self) -> Precision {
+        let tolerance = self.tolerance.min(127);
+        let step = if self.step == 0 { tolerance.max((2 * tolerance).min(8)) } else { self.step };
+        Precision { tolerance, step: step.clamp(1, 2 * tolerance + 1) }
+    }
 }
 
 /// One frame, ready for any transport.
@@ -33,23 +58,17 @@ pub struct Frame {
     pub bytes: Arc<[u8]>,
 }
 
-/// Why a state could not be published.
-#[derive(Debug, thiserror::Error)]
-pub enum PublishError {
-    /// The compressor failed, which means that memory ran out.
-    #[error("publish: compression failed: {0}; free memory and publish again")]
-    Compress(#[from] std::io::Error),
-}
-
 /// The sending end: takes the state of each epoch, gives the frame that carries subscribers there.
 ///
-/// It keeps one byte a point (what subscribers hold) and the encoded layout, and never an older state: a
+/// It keeps what subscribers hold, some bytes a point to find out how to say what changed, and the encoded layout, and never an older state: a
 /// subscriber that fell behind or joins takes a snapshot of the present one, made at most once an epoch.
 #[derive(Clone, Debug)]
 pub struct Publisher {
     scene_hash: [u8; 32],
     config: PublisherConfig,
     next_epoch: u64,
+    /// Points that the last call changed.
+    changed: u32,
     state: Option<State>,
     /// For layouts that are yet to come.
     cuts: Option<(Arc<PointLayout>, Cuts)>,
@@ -58,11 +77,11 @@ pub struct Publisher {
 /// What subscribers that are up to date hold.
 #[derive(Clone, Debug)]
 struct State {
-    layout: Arc<PointLayout>,
-    layout_bytes: Vec<u8>,
-    /// How many of those are cuts.
-    cut_bytes: usize,
-    visibility: Vec<u8>,
+    store: PointStore,
+    encoded: EncodedLayout,
+    near: Near,
+    scratch: Scratch,
+    fit: Fit,
     group: u64,
     /// Epoch of the last change, not of the last call.
     epoch: u64,
@@ -74,7 +93,12 @@ struct State {
 impl Publisher {
     /// A publisher of the scene with this hash. Nothing is sent before the first [`Publisher::publish`].
     pub fn new(scene_hash: [u8; 32], config: PublisherConfig) -> Publisher {
-        Publisher { scene_hash, config, next_epoch: 0, state: None, cuts: None }
+        Publisher { scene_hash, config, next_epoch: 0, changed: 0, state: None, cuts: None }
+    }
+
+    /// From the next [`Publisher::publish`] on, deltas are this exact.
+    pub fn set_precision(&mut self, precision: Precision) {
+        self.config.precision = precision;
     }
 
     /// Gives the cuts of a layout that is to be published next: they go out with its snapshots. Without them a layout
@@ -85,76 +109,92 @@ impl Publisher {
 
     /// How many bytes of each snapshot are cuts; 0 before the first [`Publisher::publish`].
     pub fn cut_bytes(&self) -> usize {
-        self.state.as_ref().map_or(0, |state| state.cut_bytes)
+        self.state.as_ref().map_or(0, |state| state.encoded.cut_bytes)
     }
 
     /// Publishes the state of the next epoch; epochs count the calls, from 0. Gives the frame for subscribers
-    /// that are up to date, or `None` where they already hold this state: a still scene sends nothing.
+    /// that are up to date, or `None` where what they hold is within the tolerance: a still scene sends nothing.
     ///
-    /// What changed is found here, by comparison with what subscribers hold. The frame is a delta, or a snapshot
-    /// where a group starts: at first, with a new layout, and as [`PublisherConfig::deltas_per_group`] says.
-    /// On an error nothing has happened.
-    pub fn publish(&mut self, store: &PointStore) -> Result<Option<Frame>, PublishError> {
+    /// What changed is found here, by comparison with what subscribers hold, which [`Publisher::store`] then is. The frame is a
+    /// delta, or a snapshot where a group starts: at first, with a new layout, and as [`PublisherConfig::deltas_per_group`] says.
+    pub fn publish(&mut self, store: &PointStore) -> Option<Frame> {
         let epoch = self.next_epoch;
-        let frame = match &mut self.state {
-            Some(state) if same_layout(&state.layout, store.layout()) => {
+        let (frame, changed) = match &mut self.state {
+            Some(state) if same_layout(state.store.layout(), store.layout()) => {
+                let precision = self.config.precision.in_range();
                 let full = self.config.deltas_per_group;
-                if full > 0 && state.deltas >= full && state.visibility != store.visibility() {
-                    let previous = std::mem::replace(&mut state.visibility, store.visibility().to_vec());
-                    match state.start_group(epoch, &self.scene_hash) {
-                        Ok(frame) => Some(frame),
-                        Err(error) => {
-                            state.visibility = previous;
-                            return Err(error.into());
-                        }
+                let held = state.store.visibility();
+                match Goal::new(held, store.visibility(), precision.tolerance, precision.step) {
+                    None => (None, 0),
+                    Some(_) if full > 0 && state.deltas >= full => {
+                        let changed = held.iter().zip(store.visibility()).filter(|(a, b)| a != b).count();
+                        state.store = store.clone();
+                        (Some(state.start_group(epoch, &self.scene_hash)), changed)
                     }
-                } else {
-                    state.advance(epoch, store.visibility())?
+                    Some(goal) => {
+                        let (frame, changed) = state.advance(epoch, goal);
+                        (Some(frame), changed)
+                    }
                 }
             }
             old => {
                 let given = self.cuts.as_ref().filter(|(layout, _)| same_layout(layout, store.layout()));
                 let none = Cuts::default();
-                let (layout_bytes, cut_bytes) =
-                    encode_layout(store.layout(), given.map_or(&none, |(_, cuts)| cuts))?;
+                let encoded = encode_layout(store.layout(), given.map_or(&none, |(_, cuts)| cuts));
                 let group =
                     old.as_ref().map_or(self.config.first_group.min(u64::MAX >> 1), |state| state.group + 1);
                 let state = State {
-                    layout: store.layout().clone(),
-                    layout_bytes,
-                    cut_bytes,
-                    visibility: store.visibility().to_vec(),
+                    near: Near::new(store.layout(), encoded.local_bits),
+                    store: store.clone(),
+                    encoded,
+                    scratch: Scratch::default(),
+                    fit: Fit::default(),
                     group,
                     epoch,
                     deltas: 0,
                     snapshot: OnceLock::new(),
                 };
-                let frame = state.snapshot(&self.scene_hash)?;
+                let frame = state.snapshot(&self.scene_hash);
                 *old = Some(state);
                 self.cuts = None;
-                Some(frame)
+                (Some(frame), store.visibility().len())
             }
         };
-        self.next_epoch = epoch + 1;
-        Ok(frame)
+        (self.next_epoch, self.changed) = (epoch + 1, changed as u32);
+        frame
+    }
+
+    /// What subscribers that are up to date hold, to the bit. `None` before the first [`Publisher::publish`].
+    pub fn store(&self) -> Option<&PointStore> {
+        self.state.as_ref().map(|state| &state.store)
+    }
+
+    /// How many points the last [`Publisher::publish`] gave subscribers new values of.
+    pub fn changed(&self) -> u32 {
+        self.changed
+    }
+
+    /// Bytes held for what subscribers hold and for saying what changed, by capacity; the layout, which is shared, not counted.
+    pub fn bytes(&self) -> usize {
+        self.state.as_ref().map_or(0, |state| {
+            state.store.visibility().len()
+                + state.encoded.bytes.capacity()
+                + state.near.bytes()
+                + state.scratch.bytes()
+                + state.snapshot.get().map_or(0, |frame| frame.bytes.len())
+        })
     }
 
     /// What a subscriber that joins now, or fell behind, needs: one snapshot of the present state, after which
     /// it is up to date. `None` before the first [`Publisher::publish`].
-    pub fn join(&self) -> Result<Option<Frame>, PublishError> {
-        match &self.state {
-            Some(state) => Ok(Some(state.snapshot(&self.scene_hash)?)),
-            None => Ok(None),
-        }
+    pub fn join(&self) -> Option<Frame> {
+        self.state.as_ref().map(|state| state.snapshot(&self.scene_hash))
     }
 
     /// Starts a new group with the present state; its snapshot is for everyone. `None` before the first
     /// [`Publisher::publish`].
-    pub fn start_group(&mut self) -> Result<Option<Frame>, PublishError> {
-        match &mut self.state {
-            Some(state) => Ok(Some(state.start_group(state.epoch, &self.scene_hash)?)),
-            None => Ok(None),
-        }
+    pub fn start_group(&mut self) -> Option<Frame> {
+        self.state.as_mut().map(|state| state.start_group(state.epoch, &self.scene_hash))
     }
 
     /// The group that subscribers that are up to date are in.
@@ -170,34 +210,47 @@ impl Publisher {
 
 impl State {
     /// The snapshot of the present state. Its layout part is only copied.
-    fn snapshot(&self, scene_hash: &[u8; 32]) -> Result<Frame, std::io::Error> {
-        if let Some(frame) = self.snapshot.get() {
-            return Ok(frame.clone());
-        }
-        let payload = snapshot_payload(scene_hash, &self.layout_bytes, &self.visibility)?;
-        let frame = Frame::new(FrameKind::Snapshot, self.group, self.epoch, &payload);
-        Ok(self.snapshot.get_or_init(|| frame).clone())
+    fn snapshot(&self, scene_hash: &[u8; 32]) -> Frame {
+        let make = || Frame::new(FrameKind::Snapshot, self.group, self.epoch, &self.payload(scene_hash));
+        self.snapshot.get_or_init(make).clone()
     }
 
-    /// Puts the present values into a new group at `epoch`; on an error nothing has happened.
-    fn start_group(&mut self, epoch: u64, scene_hash: &[u8; 32]) -> Result<Frame, std::io::Error> {
-        let payload = snapshot_payload(scene_hash, &self.layout_bytes, &self.visibility)?;
+    fn payload(&self, scene_hash: &[u8; 32]) -> Vec<u8> {
+        snapshot_payload(
+            scene_hash,
+            &self.encoded,
+            (self.store.layout(), &self.near),
+            self.store.visibility(),
+        )
+    }
+
+    /// Puts the present values into a new group at `epoch`.
+    fn start_group(&mut self, epoch: u64, scene_hash: &[u8; 32]) -> Frame {
+        let payload = self.payload(scene_hash);
         let frame = Frame::new(FrameKind::Snapshot, self.group + 1, epoch, &payload);
         (self.group, self.epoch, self.deltas) = (self.group + 1, epoch, 0);
         self.snapshot = OnceLock::from(frame.clone());
-        Ok(frame)
+        frame
     }
 
-    /// Goes on to the values `visibility` within the group.
-    fn advance(&mut self, epoch: u64, visibility: &[u8]) -> Result<Option<Frame>, std::io::Error> {
-        let Some(payload) = delta_payload(epoch - self.epoch, &self.visibility, visibility)? else {
-            return Ok(None);
-        };
-        self.visibility.copy_from_slice(visibility);
+    /// Goes on to values within the goal, in the same group. Also says how many changed.
+    fn advance(&mut self, epoch: u64, goal: Goal<'_>) -> (Frame, usize) {
+        let layout = self.store.layout().clone();
+        let (payload, changes) = delta_payload(
+            epoch - self.epoch,
+            (&layout, &mut self.near),
+            self.store.visibility(),
+            goal,
+            &mut self.fit,
+            &mut self.scratch,
+        );
+        let news: Vec<Change> =
+            changes.iter().map(|c| Change { point: c.point, visibility: c.new }).collect();
+        self.store.apply(&news).expect("changes are of points of the store");
         self.epoch = epoch;
         self.deltas = self.deltas.saturating_add(1);
         self.snapshot = OnceLock::new();
-        Ok(Some(Frame::new(FrameKind::Delta, self.group, epoch, &payload)))
+        (Frame::new(FrameKind::Delta, self.group, epoch, &payload), changes.len())
     }
 }
 

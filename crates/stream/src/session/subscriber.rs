@@ -6,8 +6,8 @@ use dapple_store::charts::Cuts;
 use dapple_store::points::{Change, PointLayout, PointStore, StoreError};
 
 use crate::codec::{
-    DecodeError, FrameHeader, FrameKind, Limits, decode_layout, decode_steps, decode_values, open,
-    parse_delta, parse_snapshot,
+    DecodeError, DecodedLayout, FrameHeader, FrameKind, Limits, Near, Scratch, ValueChange, decode_changes,
+    decode_layout, decode_values, open, parse_delta, parse_snapshot,
 };
 
 /// What a frame did to the store, so that the receiver redoes only that.
@@ -19,17 +19,6 @@ pub enum Applied {
     Changes(Vec<ValueChange>),
     /// Nothing; the frame was not needed.
     Ignored(IgnoreReason),
-}
-
-/// A point whose visibility changed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ValueChange {
-    /// Index of the point in the store.
-    pub point: u32,
-    /// Visibility before, 255 = open.
-    pub old: u8,
-    /// Visibility now; never the same.
-    pub new: u8,
 }
 
 /// Why a sound frame was not needed.
@@ -110,6 +99,8 @@ struct State {
     layout_bytes: Vec<u8>,
     cuts: Cuts,
     store: PointStore,
+    near: Near,
+    scratch: Scratch,
 }
 
 impl Subscriber {
@@ -151,6 +142,14 @@ impl Subscriber {
         self.state.as_ref().map(|state| state.epoch)
     }
 
+    /// Bytes held for what comes next, by capacity: the encoded layout and what deltas are foretold from. Store and cuts, which
+    /// others see, are not counted.
+    pub fn bytes(&self) -> usize {
+        self.state
+            .as_ref()
+            .map_or(0, |state| state.layout_bytes.capacity() + state.near.bytes() + state.scratch.bytes())
+    }
+
     /// Hash of the scene that the held light belongs to.
     pub fn scene_hash(&self) -> Option<[u8; 32]> {
         self.state.as_ref().map(|state| state.scene_hash)
@@ -180,7 +179,7 @@ impl Subscriber {
             && state.scene_hash == parts.scene_hash
             && state.layout_bytes == parts.layout
         {
-            let values = decode_values(parts.values, state.store.layout().len())?;
+            let values = decode_values(parts.values, state.store.layout(), &state.near)?;
             let changes: Vec<ValueChange> = (0u32..)
                 .zip(state.store.visibility().iter().zip(&values))
                 .filter(|(_, (old, new))| old != new)
@@ -190,9 +189,10 @@ impl Subscriber {
             (state.group, state.epoch) = (header.group, header.epoch);
             return Ok(Applied::Changes(changes));
         }
-        let (layout, cuts) = decode_layout(parts.layout, &self.limits)?;
+        let DecodedLayout { layout, cuts, local_bits } = decode_layout(parts.layout, &self.limits)?;
+        let near = Near::new(&layout, local_bits);
+        let values = decode_values(parts.values, &layout, &near)?;
         let layout = Arc::new(layout);
-        let values = decode_values(parts.values, layout.len())?;
         self.state = Some(State {
             group: header.group,
             epoch: header.epoch,
@@ -200,6 +200,8 @@ impl Subscriber {
             layout_bytes: parts.layout.to_vec(),
             cuts,
             store: new_store(layout, values)?,
+            near,
+            scratch: Scratch::default(),
         });
         Ok(Applied::NewLayout)
     }
@@ -212,14 +214,8 @@ impl Subscriber {
         if (state.group, state.epoch) != (header.group, parts.base_epoch) {
             return Err(need(Some((state.group, state.epoch))));
         }
-        let values = state.store.visibility();
-        let changes: Vec<ValueChange> = decode_steps(&parts, values.len())?
-            .into_iter()
-            .map(|(point, step)| {
-                let old = values[point as usize];
-                ValueChange { point, old, new: old.wrapping_add(step) }
-            })
-            .collect();
+        let State { store, near, scratch, .. } = state;
+        let changes = decode_changes(&parts, store.layout(), near, store.visibility(), scratch)?;
         let news: Vec<Change> =
             changes.iter().map(|c| Change { point: c.point, visibility: c.new }).collect();
         state.store.apply(&news).map_err(misfit)?;

@@ -171,7 +171,6 @@ impl Running {
         let generate = GenerateParams { points_per_m2: 300.0, ..Default::default() };
         let points = generate_points(&scene, pose, &tracer, &generate, &|_| ()).unwrap();
         let updater = Updater::new(&scene, pose, &tracer, points, UpdateParams::default(), &|_| ()).unwrap();
-        let updater = updater.with_threshold(0);
         let paper = PaperUpdater::new(&scene, pose, &updater, params).unwrap();
         Running { scene, tracer, updater, paper }
     }

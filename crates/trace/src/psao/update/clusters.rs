@@ -22,7 +22,7 @@ pub(super) struct Cluster {
     stale: bool,
     /// A mover came or left in the last step.
     pub(super) touched: bool,
-    /// Greatest difference from what was published, when last traced.
+    /// Greatest difference from what was known, when last traced.
     pub(super) last_change: u8,
     /// The step in which `waiting` was filled.
     pub(super) since: u32,

@@ -1,7 +1,7 @@
 //! Server update ([Neff2023] sec. 3.3): traces the points that a mover can affect, and reports what changed.
 //!
-//! Takes the scene's pose and a tracer brought up to it; returns the [`Change`](dapple_store::points::Change)s above
-//! the threshold. A step has two halves: [`Updater::select`] finds and ranks, [`Updater::trace_selected`] traces.
+//! Takes the scene's pose and a tracer brought up to it; returns the [`Change`](dapple_store::points::Change)s.
+//! A step has two halves: [`Updater::select`] finds and ranks, [`Updater::trace_selected`] traces.
 
 mod clusters;
 mod interest;
@@ -31,7 +31,7 @@ use trace::{Context, Scratch, Traced};
 /// Most rays of a point at rest.
 const MAX_RAYS_STILL: u32 = 1024;
 
-/// How visibility is traced and when it counts as changed.
+/// How visibility is traced.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UpdateParams {
     /// Rays a point, 1 … 256, always in the same directions relative to the point's surface. Default 64.
@@ -42,13 +42,11 @@ pub struct UpdateParams {
     pub rays_still: u32,
     /// Occlusion distance in metres, > 0. Default 0.6 ([Neff2023] sec. 4).
     pub radius_m: f32,
-    /// A point is sent when its visibility (0 … 255) differs by more than this from what was last sent. Default 4.
-    pub threshold: u8,
 }
 
 impl Default for UpdateParams {
     fn default() -> Self {
-        UpdateParams { rays: 64, rays_still: 0, radius_m: 0.6, threshold: 4 }
+        UpdateParams { rays: 64, rays_still: 0, radius_m: 0.6 }
     }
 }
 
@@ -81,7 +79,7 @@ impl UpdateParams {
     }
 }
 
-/// The server's memory of all points: anchors, the visibility that was last published, and what still instances block.
+/// The server's memory of all points: anchors, the visibility that was last traced, and what still instances block.
 #[derive(Clone, Debug)]
 pub struct Updater {
     params: UpdateParams,
@@ -151,7 +149,7 @@ impl Updater {
         Ok(updater)
     }
 
-    /// What has been published: the state every subscriber converges to.
+    /// What was last traced of each point.
     pub fn store(&self) -> &PointStore {
         &self.store
     }
@@ -159,13 +157,6 @@ impl Updater {
     /// Where each point sits on its mesh, in the order of the store.
     pub fn anchors(&self) -> &[Anchor] {
         &self.anchors
-    }
-
-    /// The same with another threshold. With 0 the store holds, after each step without a budget, what every point's rays say.
-    #[must_use]
-    pub fn with_threshold(mut self, threshold: u8) -> Updater {
-        self.params.threshold = threshold;
-        self
     }
 
     /// Where every point is in the world at `pose` (`None` where its triangle has collapsed), in the order of the store.
@@ -227,7 +218,7 @@ impl Updater {
             patterns: &self.patterns,
             params: &self.params,
             movers: self.motion.casting_movers(scene),
-            published: self.store.visibility(),
+            known: self.store.visibility(),
         };
         let traced: Vec<Traced> = self
             .clusters
@@ -255,8 +246,8 @@ impl Updater {
         self.restless = self.params.refines();
         let rays = self.params.rays.max(self.params.rays_still);
         let values = self.trace_all(scene, pose, tracer, rays, &|_| ());
-        let published = self.store.visibility().iter().zip(values);
-        let changed = (0..).zip(published).filter(|(_, (a, b))| a.abs_diff(*b) > self.params.threshold);
+        let known = self.store.visibility().iter().zip(values);
+        let changed = (0..).zip(known).filter(|(_, (a, b))| *a != b);
         let changes: Vec<_> = changed
             .map(|(point, (_, visibility))| dapple_store::points::Change { point, visibility })
             .collect();
@@ -280,9 +271,9 @@ impl Updater {
         rays: u32,
         progress: &(dyn Fn(usize) + Sync),
     ) -> Vec<u8> {
-        let (anchors, params, published) = (&self.anchors[..], &self.params, self.store.visibility());
+        let (anchors, params, known) = (&self.anchors[..], &self.params, self.store.visibility());
         let (patterns, movers) = (&self.patterns, Vec::new());
-        let context = Context { scene, pose, tracer, anchors, patterns, params, movers, published };
+        let context = Context { scene, pose, tracer, anchors, patterns, params, movers, known };
         let done = std::sync::atomic::AtomicUsize::new(0);
         self.clusters
             .par_chunks(16)

@@ -65,7 +65,7 @@ impl StepCounts {
 /// What one step did.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct UpdateReport {
-    /// Points whose published visibility changes, ascending.
+    /// Points whose visibility changes, ascending.
     pub changes: Vec<Change>,
     /// What it cost.
     pub counts: StepCounts,

@@ -21,7 +21,7 @@ pub(super) struct Context<'a> {
     pub(super) params: &'a UpdateParams,
     /// Where casting movers are.
     pub(super) movers: Vec<Near>,
-    pub(super) published: &'a [u8],
+    pub(super) known: &'a [u8],
 }
 
 /// What became of one cluster's points.
@@ -154,7 +154,7 @@ impl Cluster {
                 for bit in bits(self.selected) {
                     let anchor = &context.anchors[self.first as usize + bit];
                     let value = context.visibility(anchor, self.instance, context.params.rays, &mut scratch);
-                    self.publish(context, bit, value, &mut traced);
+                    self.report(context, bit, value, &mut traced);
                     traced.counts.traced_full += 1;
                     traced.counts.rays_full += u64::from(context.params.rays);
                 }
@@ -182,7 +182,7 @@ impl Cluster {
         for bit in bits(self.selected) {
             let anchor = &context.anchors[self.first as usize + bit];
             let Some(surface) = Surface::new(context, anchor, self.instance) else {
-                self.publish(context, bit, NEUTRAL, traced);
+                self.report(context, bit, NEUTRAL, traced);
                 continue;
             };
             let known = memory.valid >> bit & 1 != 0;
@@ -196,7 +196,7 @@ impl Cluster {
                 None => open,
             };
             let [rays_still, open_still] = memory.refined_of(bit, [rays, open]);
-            self.publish(context, bit, estimate(open_still, rays_still, left, open), traced);
+            self.report(context, bit, estimate(open_still, rays_still, left, open), traced);
             if known {
                 traced.counts.traced_movers += 1;
                 traced.counts.rays_movers += u64::from(open);
@@ -225,18 +225,18 @@ impl Cluster {
             let open = open + surface.count_open(Blockers::Still, before..after, scratch);
             memory.refined[bit] = [after as u16, open as u16];
             memory.settled |= u64::from(after == rays_still) << bit;
-            self.publish(context, bit, quantize(open, after), traced);
+            self.report(context, bit, quantize(open, after), traced);
             traced.counts.refined += 1;
             traced.counts.rays_refined += u64::from(after - before);
         }
         self.memory = Some(memory);
     }
 
-    fn publish(&mut self, context: &Context<'_>, bit: usize, visibility: u8, traced: &mut Traced) {
+    fn report(&mut self, context: &Context<'_>, bit: usize, visibility: u8, traced: &mut Traced) {
         let point = self.first + bit as u32;
-        let difference = visibility.abs_diff(context.published[point as usize]);
+        let difference = visibility.abs_diff(context.known[point as usize]);
         self.last_change = self.last_change.max(difference);
-        if difference > context.params.threshold {
+        if difference > 0 {
             traced.changes.push(Change { point, visibility });
         }
     }

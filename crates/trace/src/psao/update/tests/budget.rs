@@ -28,7 +28,7 @@ proptest! {
         x in 1f32..3.0,
     ) {
         let (scene, mut pose) = crowd(seed);
-        let params = UpdateParams { rays: 40, rays_still, radius_m: 0.5, threshold: 0 };
+        let params = UpdateParams { rays: 40, rays_still, radius_m: 0.5 };
         let (mut tracer, mut updater) = start_at(&scene, &pose, params, 40.0);
         let interest = halves(x);
         let input = StepInput { ray_budget: Some(rays), interest: &interest[..1] };
@@ -96,7 +96,7 @@ fn nothing_waits_for_ever() {
 #[test]
 fn what_is_seen_comes_first() {
     let (scene, mut pose) = stage();
-    let params = UpdateParams { threshold: 0, ..Default::default() };
+    let params = UpdateParams::default();
     let (mut tracer, mut updater) = start_at(&scene, &pose, params, 1000.0);
     pose.instances[2].world_from_mesh = Affine3A::from_translation(Vec3::new(1.0, 0.3, 2.0));
     tracer.update(&scene, &pose);

@@ -18,11 +18,10 @@ proptest! {
     fn a_step_equals_tracing_everything(
         seed in 0u32..1000,
         script in any_script(),
-        threshold in 0u8..6,
         rays in prop_oneof![Just(24u32), Just(64), Just(100)],
     ) {
         let (scene, mut pose) = crowd(seed);
-        let params = UpdateParams { rays, radius_m: 0.5, threshold, ..Default::default() };
+        let params = UpdateParams { rays, radius_m: 0.5, ..Default::default() };
         let (mut tracer, mut updater) = start_at(&scene, &pose, params, 40.0);
         let mut everything = updater.clone();
         for (moves, rest) in script {
@@ -77,7 +76,7 @@ fn still_surfaces_are_traced_against_movers_alone_once_they_are_known() {
 #[test]
 fn an_instance_that_rests_becomes_still_and_its_neighbours_learn_it() {
     let (scene, mut pose) = stage();
-    let (mut tracer, mut updater) = start(&scene, &pose, UpdateParams { threshold: 0, ..Default::default() });
+    let (mut tracer, mut updater) = start(&scene, &pose, UpdateParams::default());
     roll(&mut pose, 3);
     tracer.update(&scene, &pose);
     updater.step(&scene, &pose, &mut tracer, &FREE);
@@ -127,7 +126,7 @@ fn only_points_near_the_mover_are_traced() {
 fn a_mover_that_does_not_cast_changes_only_itself() {
     let (mut scene, mut pose) = stage();
     scene.instances[2].casts = false;
-    let (mut tracer, mut updater) = start(&scene, &pose, UpdateParams { threshold: 0, ..Default::default() });
+    let (mut tracer, mut updater) = start(&scene, &pose, UpdateParams::default());
     pose.instances[2].world_from_mesh = Affine3A::from_translation(Vec3::new(1.0, 0.3, 1.0));
     tracer.update(&scene, &pose);
     let own = updater.store().layout().set_of_instance(2).unwrap().clone();

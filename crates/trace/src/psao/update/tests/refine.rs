@@ -3,8 +3,8 @@
 use super::*;
 use crate::psao::update::trace::estimate;
 
-fn refined(threshold: u8) -> UpdateParams {
-    UpdateParams { rays: 64, rays_still: 256, radius_m: 0.5, threshold }
+fn refined() -> UpdateParams {
+    UpdateParams { rays: 64, rays_still: 256, radius_m: 0.5 }
 }
 
 fn put(scene: &Scene, pose: &mut Pose, tracer: &mut Tracer, place: Vec3) {
@@ -15,27 +15,27 @@ fn put(scene: &Scene, pose: &mut Pose, tracer: &mut Tracer, place: Vec3) {
 #[test]
 fn a_still_scene_settles_and_then_sends_nothing() {
     let (scene, pose) = stage();
-    for (threshold, budget) in [(4, None), (0, None), (0, Some(20_000)), (4, Some(4_321)), (0, Some(130))] {
-        let (mut tracer, mut updater) = start_at(&scene, &pose, refined(threshold), 40.0);
-        let mut published = vec![0; updater.store().layout().len()];
+    for budget in [None, Some(20_000), Some(4_321), Some(130)] {
+        let (mut tracer, mut updater) = start_at(&scene, &pose, refined(), 40.0);
+        let mut reported = vec![0; updater.store().layout().len()];
         let input = StepInput { ray_budget: budget, ..FREE };
-        let work = published.len() as u64 * 256;
+        let work = reported.len() as u64 * 256;
         // A budget below a stage of one point leaves something over each step.
         let steps = budget.map_or(2, |rays| work / rays.saturating_sub(128).clamp(64, work) + 3);
         for _ in 0..steps {
             let report = updater.step(&scene, &pose, &mut tracer, &input);
             assert!(budget.is_none_or(|rays| report.counts.rays() <= rays));
             assert_eq!(report.counts.rays(), report.counts.rays_refined);
-            report.changes.iter().for_each(|c| published[c.point as usize] += 1);
+            report.changes.iter().for_each(|c| reported[c.point as usize] += 1);
         }
         for _ in 0..200 {
             assert_eq!(updater.step(&scene, &pose, &mut tracer, &input), UpdateReport::default());
         }
         // 64 to 128 to 256.
-        assert!(published.iter().all(|times| *times <= 2));
-        assert!(threshold > 0 || published.contains(&1));
+        assert!(reported.iter().all(|times| *times <= 2));
+        assert!(reported.contains(&1));
         let missed = updater.step_all(&scene, &pose, &tracer).changes;
-        assert!(threshold > 0 || missed.is_empty(), "{} points are not at rest", missed.len());
+        assert!(missed.is_empty(), "{} points are not at rest", missed.len());
     }
 }
 
@@ -43,7 +43,7 @@ fn a_still_scene_settles_and_then_sends_nothing() {
 fn more_rays_are_nearer_the_truth() {
     let (scene, pose) = stage();
     let values = |rays_still, steps| {
-        let params = UpdateParams { rays_still, ..refined(0) };
+        let params = UpdateParams { rays_still, ..refined() };
         let (mut tracer, mut updater) = start_at(&scene, &pose, params, 40.0);
         for _ in 0..steps {
             updater.step(&scene, &pose, &mut tracer, &FREE);
@@ -62,7 +62,7 @@ fn more_rays_are_nearer_the_truth() {
 #[test]
 fn a_mover_that_came_and_left_leaves_no_trace() {
     let (scene, mut pose) = stage();
-    let (mut tracer, mut updater) = start(&scene, &pose, refined(0));
+    let (mut tracer, mut updater) = start(&scene, &pose, refined());
     let floor = updater.store().layout().set_of_instance(0).unwrap().len();
     let away = Vec3::new(1.0, 9.0, 1.0);
     put(&scene, &mut pose, &mut tracer, away);
@@ -113,7 +113,7 @@ fn a_mover_that_came_and_left_leaves_no_trace() {
 #[test]
 fn where_a_mover_comes_to_rest_points_settle_again() {
     let (scene, mut pose) = stage();
-    let (mut tracer, mut updater) = start(&scene, &pose, refined(0));
+    let (mut tracer, mut updater) = start(&scene, &pose, refined());
     for place in [Vec3::new(1.0, 0.26, 1.0), Vec3::new(2.5, 0.3, 2.0)] {
         put(&scene, &mut pose, &mut tracer, place);
         let mut last = 0;
@@ -131,7 +131,7 @@ fn where_a_mover_comes_to_rest_points_settle_again() {
 fn points_on_what_casts_nothing_settle_again_too() {
     let (mut scene, mut pose) = stage();
     scene.instances[2].casts = false;
-    let (mut tracer, mut updater) = start(&scene, &pose, refined(0));
+    let (mut tracer, mut updater) = start(&scene, &pose, refined());
     put(&scene, &mut pose, &mut tracer, Vec3::new(1.0, 0.26, 1.0));
     for _ in 0..100 {
         updater.step(&scene, &pose, &mut tracer, &FREE);
@@ -143,7 +143,7 @@ fn points_on_what_casts_nothing_settle_again_too() {
 #[test]
 fn a_budget_below_one_refinement_still_refines() {
     let (scene, pose) = stage();
-    let (mut tracer, mut updater) = start(&scene, &pose, refined(0));
+    let (mut tracer, mut updater) = start(&scene, &pose, refined());
     let input = StepInput { ray_budget: Some(1), ..FREE };
     for step in 0..50 {
         let report = updater.step(&scene, &pose, &mut tracer, &input);
@@ -154,7 +154,7 @@ fn a_budget_below_one_refinement_still_refines() {
 #[test]
 fn refinement_goes_on_after_a_backlog_longer_than_rest() {
     let (scene, mut pose) = stage();
-    let (mut tracer, mut updater) = start(&scene, &pose, refined(0));
+    let (mut tracer, mut updater) = start(&scene, &pose, refined());
     put(&scene, &mut pose, &mut tracer, Vec3::new(1.0, 0.26, 1.0));
     let mut most = 0;
     for _ in 0..400 {

@@ -1,0 +1,16 @@
+//! Values of points ⇄ choices: foretold from neighbours, and what is left as few small numbers.
+
+mod delta;
+#[cfg(feature = "publish")]
+mod goal;
+mod near;
+mod snapshot;
+mod start;
+
+pub use delta::ValueChange;
+pub(crate) use delta::{Guide, MOST_FOLLOW, Scale, Scratch, code_changes};
+#[cfg(feature = "publish")]
+pub(crate) use goal::{Fit, Goal};
+pub(crate) use near::Near;
+pub(crate) use snapshot::code_values;
+pub use start::first_chances;
