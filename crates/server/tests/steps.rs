@@ -42,7 +42,7 @@ fn what_is_published_depends_on_the_time_and_not_on_the_way_there() {
 
 #[test]
 fn only_what_the_box_comes_near_is_traced_and_sent() {
-    let mut server = start(&config(4));
+    let mut server = start(&config(0));
     let points = server.store().layout().len();
     let floor = server.store().layout().set_of_instance(0).unwrap().len();
     assert!((1400..1700).contains(&floor), "half of 200 points a square metre: {floor}");
@@ -76,6 +76,8 @@ fn a_slow_change_is_sent_once_it_adds_up() {
     let (mut slow, mut exact) = (start(&config(10)), start(&config(0)));
     for step in 1..=100 {
         slow.step(f64::from(step) * 0.01).unwrap();
+        let pairs = slow.store().visibility().iter().zip(slow.traced().visibility());
+        assert!(pairs.clone().all(|(a, b)| a.abs_diff(*b) <= 10), "at step {step}");
     }
     exact.step(1.0).unwrap();
     let pairs = slow.store().visibility().iter().zip(exact.store().visibility());

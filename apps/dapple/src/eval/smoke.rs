@@ -19,15 +19,15 @@ const BOUNDS: [Bound; 2] = [
         method: "psao",
         least_visibility_psnr_db: 28.1,
         most_flip: 0.03,
-        most_kbit_per_s: 220.0,
-        most_snapshot_bytes_per_point: 3.2,
+        most_kbit_per_s: 95.0,
+        most_snapshot_bytes_per_point: 2.8,
     },
     Bound {
         method: "psao-hat",
         least_visibility_psnr_db: 25.0,
         most_flip: 0.035,
-        most_kbit_per_s: 220.0,
-        most_snapshot_bytes_per_point: 3.2,
+        most_kbit_per_s: 95.0,
+        most_snapshot_bytes_per_point: 2.8,
     },
 ];
 
