@@ -145,7 +145,7 @@ impl Runner {
     }
 
     fn page(&self) -> Result<()> {
-        wasm::install_driver(self.root());
+        wasm::install_test_packages(self.root());
         wasm::build(self.root(), self.metadata.target_directory.as_std_path(), |arguments| {
             self.cargo(arguments)
         })

@@ -19,10 +19,18 @@ pub(crate) fn has_target() -> bool {
     output.is_ok_and(|output| Path::new(String::from_utf8_lossy(&output.stdout).trim()).is_dir())
 }
 
-/// Installs what drives a browser in the page's tests, where there is npm and it is not installed yet. That there is
-/// none is no error: those tests then say that they were skipped.
-pub(crate) fn install_driver(root: &Path) {
-    let folder = root.join("apps/web/tests/browser");
+/// Folders of tests that need packages for JavaScript.
+const TEST_FOLDERS: [&str; 2] = ["apps/web/tests/browser", "apps/dapple/tests/bake/readers"];
+
+/// Installs what drives a browser in tests and what reads baked files, where there is npm and it is not installed yet. That there
+/// is none is no error: those tests then say that they were skipped.
+pub(crate) fn install_test_packages(root: &Path) {
+    for folder in TEST_FOLDERS {
+        install(&root.join(folder));
+    }
+}
+
+fn install(folder: &Path) {
     // npm leaves this file behind when it is done; it is as old as what it installed.
     let modified = |path: &str| folder.join(path).metadata().and_then(|metadata| metadata.modified()).ok();
     let (installed, wanted) = (modified("node_modules/.package-lock.json"), modified("package-lock.json"));
@@ -30,16 +38,16 @@ pub(crate) fn install_driver(root: &Path) {
         return;
     }
     let npm = if cfg!(windows) { "npm.cmd" } else { "npm" };
-    println!("{npm} ci");
+    println!("{npm} ci in {}", folder.display());
     let status = Command::new(npm)
         .args(["ci", "--ignore-scripts", "--no-audit", "--no-fund"])
-        .current_dir(&folder)
+        .current_dir(folder)
         .stdin(Stdio::null())
         .status();
     match status {
         Ok(status) if status.success() => {}
-        Ok(status) => println!("npm ended with {status}: no browser will be driven in tests"),
-        Err(_) => println!("npm is not installed: no browser will be driven in tests"),
+        Ok(status) => println!("npm ended with {status}: tests that need it will be skipped"),
+        Err(_) => println!("npm is not installed: tests that need it will be skipped"),
     }
 }
 

@@ -8,6 +8,7 @@ mod bake;
 mod demo;
 mod eval;
 mod exr_file;
+mod file;
 mod inspect;
 mod judge;
 mod light;
@@ -51,6 +52,11 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     // Windows must be opened on the program's first thread.
     if let Command::View(args) = &cli.command {
         return view::run(args);
+    }
+    // Those that write large files, which takes a while. The others may have drivers of graphics cards at work, which do not
+    // like to be ended in order.
+    if matches!(cli.command, Command::Bake(_) | Command::Record(_) | Command::Scene(_)) {
+        file::watch_interrupts();
     }
     let threads = match &cli.command {
         Command::Eval(args) => match &args.verb {

@@ -1,6 +1,5 @@
-//! Pictures of one method, compared with the truth, and files that an interrupted run never leaves half written.
+//! Pictures of one method, compared with the truth.
 
-use std::io::Write;
 use std::path::Path;
 
 use anyhow::{Context, Result};
@@ -12,66 +11,8 @@ use dapple_scene::Scene;
 use dapple_scene::glam::Vec3;
 use dapple_trace::rtao::Site;
 
+pub(crate) use crate::file::write_file;
 use crate::judge::Judge;
-
-/// Writes a whole file: into a neighbour first, then renamed over the old one.
-pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<()> {
-    write_parts(path, &[bytes])
-}
-
-/// Fails where a file could not be written, before the work that would be lost.
-pub(crate) fn check_writable(path: &Path) -> Result<()> {
-    let refuse = |error: std::io::Error| anyhow::anyhow!("cannot write {}: {error}", path.display());
-    if path.is_dir() {
-        anyhow::bail!("cannot write {}: it is a folder", path.display());
-    }
-    let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    match std::fs::metadata(folder) {
-        Ok(found) if !found.is_dir() => {
-            anyhow::bail!("cannot write {}: {} is no folder", path.display(), folder.display())
-        }
-        // It will be made.
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
-        Err(error) => return Err(refuse(error)),
-        Ok(_) => {}
-    }
-    if std::fs::metadata(path).is_ok_and(|m| !m.is_file()) {
-        return Ok(());
-    }
-    let mut trial = path.file_name().unwrap_or_default().to_owned();
-    trial.push(format!(".{}.tmp", std::process::id()));
-    let trial = path.with_file_name(trial);
-    std::fs::File::create(&trial).and_then(|_| std::fs::remove_file(&trial)).map_err(refuse)
-}
-
-/// As [`write_file`], of bytes that follow each other.
-pub(crate) fn write_parts(path: &Path, parts: &[&[u8]]) -> Result<()> {
-    if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-        std::fs::create_dir_all(folder)
-            .with_context(|| format!("cannot create the folder {}", folder.display()))?;
-    }
-    // What is written to follows links, and a device or pipe is written into, not replaced.
-    let resolved = std::fs::canonicalize(path);
-    let path = resolved.as_deref().unwrap_or(path);
-    if std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
-        let written = std::fs::File::create(path)
-            .and_then(|mut file| parts.iter().try_for_each(|part| file.write_all(part)));
-        return written.with_context(|| format!("cannot write {}", path.display()));
-    }
-    let name = path.file_name().with_context(|| format!("{} names no file", path.display()))?;
-    let mut partial = name.to_owned();
-    partial.push(format!(".{}.tmp", std::process::id()));
-    let partial = path.with_file_name(partial);
-    let written = std::fs::File::create(&partial).and_then(|mut file| {
-        parts.iter().try_for_each(|part| file.write_all(part))?;
-        file.sync_all()
-    });
-    let moved = written.and_then(|()| std::fs::rename(&partial, path));
-    if moved.is_err() {
-        let _ = std::fs::remove_file(&partial);
-    }
-    moved.with_context(|| format!("cannot write {}", path.display()))
-}
 
 /// Writes 8-bit sRGB pixels as a PNG.
 pub(crate) fn write_png(path: &Path, width: u32, height: u32, rgb8: &[[u8; 3]]) -> Result<()> {

@@ -228,16 +228,17 @@ fn compare_measures_pictures_and_flicker() {
         test["pictures"].as_array().unwrap().iter().map(|p| p["name"].as_str().unwrap()).collect();
     assert_eq!(names, ["frame-8.png", "frame-9.png", "frame-10.png", "frame-11.png"]);
     // Pictures 9 and 11 are 19 and 21 codes too light; 8 and 10 are equal.
-    let db = |codes: f64| -20.0 * (codes / 255.0).log10();
-    let mean = test["psnr_db"]["value"].as_f64().unwrap();
-    assert!((mean - (db(19.0) + db(21.0)) / 2.0).abs() < 1e-4, "{mean}");
-    assert_eq!((&test["psnr_db"]["ci95"], &test["equal_pictures"]), (&Value::Null, &Value::from(2)));
+    let mse = (19.0f64.powi(2) + 21.0f64.powi(2)) / 4.0 / 255.0f64.powi(2);
+    let pooled = test["psnr_db"]["value"].as_f64().unwrap();
+    assert!((pooled + 10.0 * mse.log10()).abs() < 1e-4, "{pooled}");
+    assert_eq!((&same["psnr_db"]["value"], &test["equal_pictures"]), (&Value::Null, &Value::from(2)));
+    assert!(test["psnr_db"]["ci95"].as_f64().unwrap() > 0.0);
     assert!(test["flip"]["ci95"].as_f64().unwrap() > 0.0);
     assert_eq!(test["worst"], serde_json::json!(["frame-11.png", "frame-9.png", "frame-8.png"]));
     // Luma goes up by 19, down by 19, up by 21 codes; the reference stands still.
-    let flicker = ((19.0f64.powi(2) * 2.0 + 21.0f64.powi(2)) / 3.0).sqrt() / 255.0;
+    let flicker = ((19.0f64.powi(2) * 2.0 + 21.0f64.powi(2)) / 3.0).sqrt();
     for key in ["flicker", "error_flicker"] {
-        assert!((test[key].as_f64().unwrap() - flicker).abs() < 1e-6, "{key}: {test}");
+        assert!((test[key].as_f64().unwrap() - flicker).abs() < 1e-3, "{key}: {test}");
         assert_eq!(same[key].as_f64(), Some(0.0));
     }
     assert_eq!((found["reference_flicker"].as_f64(), &same["equal_pictures"]), (Some(0.0), &Value::from(4)));
@@ -253,9 +254,15 @@ fn compare_measures_pictures_and_flicker() {
     assert!((flips.iter().sum::<f64>() / 4.0 - test["flip"]["value"].as_f64().unwrap()).abs() < 1e-9);
 
     let text = succeed(at, &arguments);
-    for part in
-        ["4 pictures against truth", "frame-11.png", "flicker of error", "±", "equal in test", "extra.png"]
-    {
+    for part in [
+        "4 pictures against truth",
+        "frame-11.png",
+        "flicker of error 1/255",
+        "19.689",
+        "±",
+        "equal in test: 2 of 4",
+        "extra.png",
+    ] {
         assert!(text.contains(part), "{part}: {text}");
     }
     // What applies to no folder has no column.
@@ -271,13 +278,56 @@ fn compare_writes_maps() {
     assert!(text.contains("flicker.png") && text.contains("frame-11-flip.png"), "{text}");
     let flicker = image::open(at.join("maps/flicker.png")).unwrap().into_rgb8();
     assert_eq!(flicker.dimensions(), SIDE);
-    // Everything flickers alike, by 0.077 of 0.1: light, but not the palest.
+    // Everything flickers alike, by 19.7 of 25: light, but not the palest.
     let first = flicker.get_pixel(0, 0);
     assert!(first.0[0] > 200 && first.0[2] < 150, "{first:?}");
     assert_eq!(files(&at.join("maps")).len(), 2);
     // Two folders do not write over each other.
     succeed(at, &["eval", "compare", "truth", "test", "same", "--maps", "two", "--worst", "1"]);
     assert!(at.join("two/1-test/frame-11-flip.png").is_file() && at.join("two/2-same").is_dir());
+    // Nor do pictures that differ in their ending alone.
+    for (folder, lift) in [("truth", 0), ("test", 20)] {
+        picture(lift, |_| true).save(at.join(folder).join("frame-9.jpg")).unwrap();
+    }
+    let text = succeed(at, &["eval", "compare", "truth", "test", "--maps", "endings", "--worst", "9"]);
+    let written = files(&at.join("endings"));
+    assert_eq!((written.len(), text.matches("written: ").count()), (5, 5), "{text}");
+    for name in ["frame-9.png-flip.png", "frame-9.jpg-flip.png", "frame-11-flip.png"] {
+        assert!(at.join("endings").join(name).is_file(), "{name}: {written:?}");
+    }
+}
+
+#[test]
+fn compare_pools_linear_light_by_the_brightest_of_each_picture() {
+    let folder = TempDir::new().unwrap();
+    let at = folder.path();
+    for (name, scale) in [("truth", 1.0), ("test", 1.25)] {
+        std::fs::create_dir(at.join(name)).unwrap();
+        linear(scale).save(at.join(name).join("a.exr")).unwrap();
+        // The same picture, eight times as bright: errors count as much.
+        linear(8.0 * scale).save(at.join(name).join("b.exr")).unwrap();
+    }
+    let found = json(&succeed(at, &["eval", "compare", "truth", "test", "--json"]));
+    let test = &found["tests"][0];
+    let (pooled, first) = (&test["psnr_db"]["value"], &test["pictures"][0]["psnr_db"]);
+    assert!((pooled.as_f64().unwrap() - first.as_f64().unwrap()).abs() < 1e-3, "{found}");
+}
+
+#[test]
+fn pictures_of_visibility_are_compared_as_they_are() {
+    let folder = TempDir::new().unwrap();
+    let at = folder.path();
+    let render = |method: &str, name: &str| {
+        let scene = ["--builtin", "cornell", "--detail", "0.05", "--size", "48x32", "--rays", "16"];
+        let what = ["--view", "visibility", "--method", method, "-o", name];
+        succeed(at, &[&["render"], &scene[..], &what].concat());
+    };
+    render("rtao", "truth.exr");
+    render("none", "none.exr");
+    let found = json(&succeed(at, &["eval", "diff", "truth.exr", "none.exr", "--json"]));
+    assert!(found["hdr_flip"].as_f64().unwrap() > 0.0 && found["psnr_db"].as_f64().unwrap() > 5.0, "{found}");
+    let equal = succeed(at, &["eval", "diff", "truth.exr", "truth.exr"]);
+    assert!(equal.contains("equal"), "{equal}");
 }
 
 #[test]

@@ -15,8 +15,8 @@ Examples:
   dapple bake room.glb --uv 0 --texture-size 2048 --rays 1024 --radius 1.5 -o room.glb
   dapple bake room.glb -o points.ply -o room.dapple         points with their visibility
 
-Viewers multiply an occlusion texture into indirect light only; vertex colours multiply all light. docs/baking.md says what is
-kept, and how.";
+Viewers multiply an occlusion texture into indirect light only; vertex colours multiply all light. A .dapple belongs to the scene
+as it was given, not to a .glb baked beside it: to players that is another scene. docs/baking.md says more.";
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct BakeArgs {
@@ -40,7 +40,7 @@ pub(crate) struct BakeArgs {
     /// that needs.
     #[arg(long, value_name = "N", default_value_t = 4096)]
     pub(crate) texture_size: u32,
-    /// Edge of a texel in metres, on as many images as that needs [default: what fits one image; a 12th of the radius if
+    /// Edge of a texel in metres, 0.000001 to 10000, on as many images as that needs, up to 64 [default: what fits one image; a 12th of the radius if
     /// there is room, finer for small scenes].
     #[arg(long, value_name = "METRES", allow_hyphen_values = true)]
     pub(crate) texel: Option<f64>,

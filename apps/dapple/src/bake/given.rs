@@ -20,7 +20,7 @@ const OUTSIDE: f32 = 1e-4;
 pub(crate) fn in_unit_square(corners: [Vec2; 3]) -> Option<[Vec2; 3]> {
     let low = corners[0].min(corners[1]).min(corners[2]);
     let corners = corners.map(|uv| uv - (low + OUTSIDE).floor());
-    corners.iter().all(|uv| uv.max_element() <= 1.0 + OUTSIDE).then_some(corners)
+    corners.iter().all(|uv| uv.is_finite() && uv.max_element() <= 1.0 + OUTSIDE).then_some(corners)
 }
 
 /// Pieces that lie apart from each other in one set of their own coordinates.

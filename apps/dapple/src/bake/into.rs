@@ -14,7 +14,7 @@ use super::materials::{Wardrobe, count_worn};
 use super::plan::{MeshPlan, Pool, plan, split_instances};
 use super::surfaces::Surfaces;
 use super::sweep::{accessor_users, sweep, views_in_use};
-use super::texels::{Images, bake_sheet};
+use super::texels::{Images, bake_sheets};
 use super::vertices::{self, AtVertex, Density, Welded, bake_vertices, place_counts, spread};
 use crate::args::BakeArgs;
 use crate::args::bake::{Attribute, Instances, Into, Uv};
@@ -43,7 +43,7 @@ impl std::fmt::Display for Report {
             images => parts.push(format!("{} images", images.len())),
         }
         if let Some(texel_m) = self.texel_m {
-            parts.push(format!("texels of {:.3} m in new coordinates", texel_m));
+            parts.push(format!("texels of {} in new coordinates", length(texel_m)));
         }
         if self.vertices > 0 {
             parts.push(format!("{} vertices", self.vertices));
@@ -53,6 +53,23 @@ impl std::fmt::Display for Report {
         }
         f.write_str(&parts.join(", "))
     }
+}
+
+/// A length to three digits, in a unit that suits it.
+fn length(metres: f64) -> String {
+    let (value, unit) = match metres {
+        m if m >= 1.0 => (m, "m"),
+        m if m >= 0.01 => (100.0 * m, "cm"),
+        m => (1000.0 * m, "mm"),
+    };
+    let digits = if value >= 100.0 {
+        0
+    } else if value >= 10.0 {
+        1
+    } else {
+        2
+    };
+    format!("{value:.digits$} {unit}")
 }
 
 /// What is baked into.
@@ -166,9 +183,7 @@ fn lay(
 fn images(args: &BakeArgs, surfaces: &Surfaces<'_>, layout: &Layout) -> Result<Vec<Images>> {
     let rows: usize = layout.sheets.iter().map(|sheet| sheet.height as usize).sum();
     let bar = Counter::new("texels", rows);
-    let bake =
-        |sheet| bake_sheet(surfaces, &layout.copies, sheet, args.margin, &|rows| bar.add(u64::from(rows)));
-    layout.sheets.iter().map(bake).collect()
+    bake_sheets(surfaces, layout, args.margin, &|rows| bar.add(u64::from(rows)))
 }
 
 /// How many primitives that are not baked wear each material.
@@ -291,4 +306,22 @@ pub(crate) fn pose(scene: &mut Scene, time: Option<f64>) -> dapple_scene::Pose {
     let pose = scene.pose(0.0);
     scene.set_active_animation(active);
     pose
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_have_three_digits_and_a_unit() {
+        for (metres, text) in [
+            (0.000_25, "0.25 mm"),
+            (0.004_567, "4.57 mm"),
+            (0.05, "5.00 cm"),
+            (0.3217, "32.2 cm"),
+            (150.0, "150 m"),
+        ] {
+            assert_eq!(length(metres), text);
+        }
+    }
 }

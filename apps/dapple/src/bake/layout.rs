@@ -134,8 +134,15 @@ fn add_given(
     // The side at which texels have the wanted size in the mean.
     let texel_m = settings.texel_m.unwrap_or_else(|| wanted_texel_m(area_m2, settings));
     let side = (area_m2 / area_uv.max(1e-9)).sqrt() / texel_m;
-    let side = (side.ceil().clamp(4.0, f64::from(settings.side)) as u32).next_power_of_two();
-    let side = if side > settings.side { settings.side } else { side };
+    let side = (side.ceil().clamp(4.0, 65536.0) as u32).next_power_of_two();
+    if let Some(texel_m) = settings.texel_m.filter(|_| side > settings.side) {
+        tracing::warn!(
+            "--texel {texel_m} would need {side}x{side} texels in the file's own coordinates: it gets {max}x{max}, as \
+             --texture-size is {max}; --uv new lays surfaces out on several images",
+            max = settings.side
+        );
+    }
+    let side = side.min(settings.side);
     let mut sheet = Sheet { width: side, height: side, repeats: true, patches: Vec::new() };
     let number = layout.sheets.len();
     for at in &group.pieces {

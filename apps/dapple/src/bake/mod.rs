@@ -27,11 +27,10 @@ mod vertices;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail};
-use dapple_scene::Scene;
 use dapple_trace::rtao::{MAX_RAYS, RtaoParams};
 
 use crate::args::{BakeArgs, Radius};
-use crate::picture::{check_writable, write_file, write_parts};
+use crate::file::{check_writable, write_file, write_parts};
 use crate::progress::Bar;
 use crate::source;
 use input::Input;
@@ -40,6 +39,9 @@ use surfaces::Surfaces;
 
 /// A radius below this part of the scene's diagonal is likely to be one in other units than the file's.
 const SMALL_RADIUS: f32 = 1.0 / 2000.0;
+
+/// Edges of texels that can be asked for: from a hair's breadth to a mountain's, so that scenes in any unit are served.
+const TEXELS_M: std::ops::RangeInclusive<f64> = 1e-6..=1e4;
 
 /// What a file holds, by its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,6 +59,7 @@ pub(crate) fn run(args: &BakeArgs) -> Result<()> {
     for (path, _) in &outputs {
         check_writable(path)?;
     }
+    check_recordings(args, &outputs)?;
     let mut input = input::load(&args.scene)?;
     let (radius_m, density_factor) = source::radius_of(&input.scene, args.radius)?;
     if let Radius::Metres(_) = args.radius {
@@ -67,7 +70,7 @@ pub(crate) fn run(args: &BakeArgs) -> Result<()> {
         outputs.into_iter().partition(|(_, format)| matches!(format, Format::Ply | Format::Dapple));
     if !points.is_empty() {
         let points_per_m2 = args.points * density_factor;
-        bake_points(&points, input.given.as_ref().unwrap_or(&input.scene), args, points_per_m2, &params)?;
+        bake_points(&points, &input, args, points_per_m2, &params)?;
     }
     if !scenes.is_empty() {
         let pose = into::pose(&mut input.scene, args.time);
@@ -94,11 +97,12 @@ pub(crate) fn run(args: &BakeArgs) -> Result<()> {
 
 fn bake_points(
     outputs: &[(&PathBuf, Format)],
-    scene: &Scene,
+    input: &Input,
     args: &BakeArgs,
     points_per_m2: f32,
     params: &RtaoParams,
 ) -> Result<()> {
+    let scene = input.given.as_ref().unwrap_or(&input.scene);
     let points = Points::bake(scene, args.time.unwrap_or(0.0), points_per_m2, params)?;
     for (path, format) in outputs {
         let bytes = match format {
@@ -106,7 +110,8 @@ fn bake_points(
             _ => points.to_ply(),
         };
         write_file(path, &bytes)?;
-        say!("wrote {} ({:.2} MB): {} points", path.display(), bytes.len() as f64 / 1e6, points.len());
+        let (name, megabytes, count) = (path.display(), bytes.len() as f64 / 1e6, points.len());
+        say!("wrote {name} ({megabytes:.2} MB): {count} points of {}", input.title);
     }
     Ok(())
 }
@@ -134,11 +139,28 @@ fn check(args: &BakeArgs) -> Result<()> {
     if !(16..=16384).contains(&args.texture_size) {
         bail!("--texture-size is {}, must be 16 to 16384", args.texture_size);
     }
-    if args.texel.is_some_and(|texel| !(texel.is_finite() && texel > 0.0)) {
-        bail!("--texel must be a length in metres above 0");
+    if let Some(texel_m) = args.texel.filter(|texel| !TEXELS_M.contains(texel)) {
+        bail!("--texel is {texel_m}, must be {} to {} m", TEXELS_M.start(), TEXELS_M.end());
     }
     if !(1..=64).contains(&args.margin) || 8 * args.margin > args.texture_size {
         bail!("--margin is {}, must be 1 to 64 and at most an eighth of --texture-size", args.margin);
+    }
+    Ok(())
+}
+
+/// A recording belongs to the scene as its file is now: that must not be replaced by a baked one.
+fn check_recordings(args: &BakeArgs, outputs: &[(&PathBuf, Format)]) -> Result<()> {
+    let whole = |path: &Path| std::fs::canonicalize(path).ok();
+    let Some(scene) = args.scene.scene.as_deref().and_then(whole) else { return Ok(()) };
+    let recording = outputs.iter().find(|(_, format)| *format == Format::Dapple);
+    let replaced = outputs.iter().find(|(path, _)| whole(path).is_some_and(|path| path == scene));
+    if let (Some((recording, _)), Some((replaced, _))) = (recording, replaced) {
+        bail!(
+            "{} would be a recording of {} as it is, which players could not load any more: write the baked scene to \
+             another file, or bake it first and then its points",
+            recording.display(),
+            replaced.display()
+        );
     }
     Ok(())
 }

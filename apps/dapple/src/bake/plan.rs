@@ -6,7 +6,7 @@ use dapple_trace::sampling::hash;
 
 use super::document::{Document, List};
 use super::json::Object;
-use super::surfaces::{Place, Surfaces};
+use super::surfaces::{Measured, Place, Surfaces};
 
 /// A vertex buffer that is mostly unused by a mesh is not written anew for it, only what is used of it.
 const LEAST_USED: f64 = 0.5;
@@ -161,16 +161,18 @@ impl Copy {
 }
 
 /// Gives instances of a mesh that are lit differently copies of their own. `done` is told of each instance that was compared.
+///
+/// All instances are measured at the same places of the mesh with the same rays about its own axes ([`Surfaces::measure`]): random
+/// errors are common to them, and only what differs is left.
 pub(crate) fn split_instances(plans: &mut [MeshPlan], surfaces: &Surfaces<'_>, done: &dyn Fn()) {
     for plan in plans.iter_mut().filter(|plan| plan.copies[0].instances.len() > 1) {
         let instances = std::mem::take(&mut plan.copies[0].instances);
         let places = comparison_places(surfaces, instances[0]);
         // The first instance of each copy speaks for it.
-        let mut copies: Vec<(Vec<f32>, Vec<u32>)> = Vec::new();
+        let mut copies: Vec<(Vec<Measured>, Vec<u32>)> = Vec::new();
         for &instance in &instances {
             let moved: Vec<Place> = places.iter().map(|place| Place { instance, ..*place }).collect();
-            let values: Vec<f32> =
-                surfaces.measure(&moved, COMPARED_RAYS).iter().map(|measured| measured.visibility).collect();
+            let values = surfaces.measure(&moved, COMPARED_RAYS);
             match copies.iter_mut().find(|(known, _)| difference(known, &values) <= NOTICEABLE) {
                 Some((_, members)) => members.push(instance),
                 None => copies.push((values, vec![instance])),
@@ -181,10 +183,14 @@ pub(crate) fn split_instances(plans: &mut [MeshPlan], surfaces: &Surfaces<'_>, d
     }
 }
 
-/// Root mean square difference.
-fn difference(a: &[f32], b: &[f32]) -> f64 {
-    let squares: f64 = a.iter().zip(b).map(|(a, b)| f64::from(a - b) * f64::from(a - b)).sum();
-    (squares / a.len().max(1) as f64).sqrt()
+/// Root mean square difference of visibility over the places that can be seen on one of both at least.
+fn difference(a: &[Measured], b: &[Measured]) -> f64 {
+    let seen = a.iter().zip(b).filter(|(a, b)| !(a.hidden && b.hidden));
+    let (squares, count) = seen.fold((0.0, 0), |(squares, count), (a, b)| {
+        let difference = f64::from(a.visibility - b.visibility);
+        (squares + difference * difference, count + 1)
+    });
+    (squares / f64::from(count.max(1))).sqrt()
 }
 
 /// Places on an instance, even by area.
@@ -226,4 +232,22 @@ pub(crate) fn place_in_triangle(seed: u64, index: u32) -> [f32; 2] {
     let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
     let inwards = |x: f32| 1e-3 / 3.0 + 0.999 * x;
     [inwards(u), inwards(v)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_hidden_on_both_does_not_tell_instances_apart() {
+        let at = |visibility: f32, hidden: bool| Measured { visibility, hidden, ..Measured::default() };
+        let open = [at(1.0, false), at(0.5, false), at(0.0, true), at(0.0, true)];
+        assert_eq!(difference(&open, &open), 0.0);
+        let inside = [at(1.0, false), at(0.5, false), at(1.0, true), at(0.7, true)];
+        assert_eq!(difference(&open, &inside), 0.0);
+        // Seen on one of them it counts: three places, one of which differs by 1.
+        let out = [at(1.0, false), at(0.5, false), at(1.0, false), at(0.0, true)];
+        assert!((difference(&open, &out) - (1.0f64 / 3.0).sqrt()).abs() < 1e-12);
+        assert_eq!(difference(&[at(0.0, true)], &[at(1.0, true)]), 0.0);
+    }
 }

@@ -175,7 +175,20 @@ impl<'a> Surfaces<'a> {
         // A normal far from the face's is a slip of its maker.
         let usable = shading.is_finite() && shading.dot(site.normal_world) > LEAST_SHADING_COSINE;
         let shading_normal_world = if usable { shading } else { site.normal_world };
-        SmoothSite { site, shading_normal_world, first_ray: place.turn.saturating_mul(rays) }
+        let first_ray = place.turn.saturating_mul(rays);
+        let axes_world = self.axes(place, shading_normal_world);
+        SmoothSite { site, shading_normal_world, first_ray, axes_world }
+    }
+
+    /// Axes about a normal that turn with the instance, and are mirrored where it is, so that the same place of equal instances
+    /// in equal surroundings measures the same; `None` for a triangle without a first edge across the normal.
+    fn axes(&self, place: &Place, normal_world: Vec3) -> Option<[Vec3; 2]> {
+        let instance = place.instance as usize;
+        let [a, b, _] = self.corners_world(instance, place.triangle as usize);
+        let edge = (b - a).try_normalize()?;
+        let x = (edge - normal_world * edge.dot(normal_world)).try_normalize()?;
+        let y = normal_world.cross(x);
+        Some([x, if self.mirrored[instance] { -y } else { y }])
     }
 
     /// Measures places on several instances of one mesh, and gives the mean of what can be seen; `rays` are shared among them.

@@ -1,13 +1,13 @@
-//! Measures the texels of an image.
+//! Measures the texels of images.
 
 use anyhow::{Context, Result};
 use dapple_scene::glam::Vec3;
 
 use super::fill::Planes;
-use super::layout::Sheet;
+use super::layout::{Layout, Sheet};
 use super::plan::Copy;
 use super::raster::{Band, SUB, bands, rasterize};
-use super::stitch::stitch;
+use super::stitch::Seams;
 use super::surfaces::{Place, Sum, Surfaces};
 
 /// Texels rasterised and measured at a time.
@@ -27,38 +27,59 @@ pub(crate) struct Images {
     pub(crate) bent: Option<Vec<u8>>,
 }
 
-/// Measures a sheet with so many rays a texel. `done` is told of the rows that are done.
-pub(crate) fn bake_sheet(
+/// The texels of a sheet as bytes: all that is kept of it while others are measured.
+struct Texels {
+    visibility: Vec<u8>,
+    bent: Option<Vec<[u8; 3]>>,
+}
+
+impl Texels {
+    fn put(&mut self, at: usize, values: &[f32]) {
+        self.visibility[at] = unorm8(values[0]);
+        if let (Some(bent), &[_, x, y, z]) = (&mut self.bent, values) {
+            bent[at] = (0.5 + 0.5 * Vec3::new(x, y, z).normalize_or_zero()).to_array().map(unorm8);
+        }
+    }
+}
+
+/// Measures all sheets of a layout and stitches their seams. `done` is told of the rows that are done.
+pub(crate) fn bake_sheets(
     surfaces: &Surfaces<'_>,
-    copies: &[Copy],
-    sheet: &Sheet,
+    layout: &Layout,
     margin: u32,
     done: &dyn Fn(u32),
-) -> Result<Images> {
+) -> Result<Vec<Images>> {
     let bent = surfaces.measures_bent();
-    let (width, height) = (sheet.width as usize, sheet.height as usize);
-    let mut planes = Planes::new(width, height, if bent { 4 } else { 1 });
-    let mut weights = vec![UNKNOWN; width * height];
-    for band in bands(sheet, (BAND_TEXELS / sheet.width.max(1)).clamp(1, 256)) {
-        measure_band(surfaces, copies, sheet, &band, &mut planes, &mut weights);
-        done(band.rows.len() as u32);
-    }
-    planes.fill(margin + 2, &[1.0, 0.0, 0.0, 0.0]);
-    stitch(surfaces, copies, sheet, &weights, &mut planes);
-    let gray: Vec<u8> = planes.channels[0].iter().map(|&v| unorm8(v)).collect();
-    let visibility = png(sheet, &gray, image::ExtendedColorType::L8)?;
-    let bent = match bent {
-        false => None,
-        true => {
-            let unit = |i: usize| {
-                let open = Vec3::new(planes.channels[1][i], planes.channels[2][i], planes.channels[3][i]);
-                (0.5 + 0.5 * open.normalize_or_zero()).to_array().map(unorm8)
-            };
-            let rgb: Vec<u8> = (0..width * height).flat_map(unit).collect();
-            Some(png(sheet, &rgb, image::ExtendedColorType::Rgb8)?)
+    let channels = if bent { 4 } else { 1 };
+    let mut seams = Seams::find(surfaces, &layout.copies, &layout.sheets, channels);
+    let mut baked = Vec::with_capacity(layout.sheets.len());
+    for (number, sheet) in layout.sheets.iter().enumerate() {
+        let count = sheet.width as usize * sheet.height as usize;
+        let mut planes = Planes::new(sheet.width as usize, sheet.height as usize, channels);
+        let mut weights = vec![UNKNOWN; count];
+        for band in bands(sheet, (BAND_TEXELS / sheet.width.max(1)).clamp(1, 256)) {
+            measure_band(surfaces, &layout.copies, sheet, &band, &mut planes, &mut weights);
+            done(band.rows.len() as u32);
         }
+        planes.fill(margin + 2, &[1.0, 0.0, 0.0, 0.0]);
+        seams.take(number, &planes, &weights);
+        let mut texels = Texels { visibility: vec![0; count], bent: bent.then(|| vec![[0; 3]; count]) };
+        let mut values = vec![0.0; channels];
+        for at in 0..count {
+            for (value, channel) in values.iter_mut().zip(&planes.channels) {
+                *value = channel[at];
+            }
+            texels.put(at, &values);
+        }
+        baked.push(texels);
+    }
+    seams.stitch(|sheet, at, values| baked[sheet].put(at, values));
+    let encode = |(sheet, texels): (&Sheet, Texels)| {
+        let visibility = png(sheet, &texels.visibility, image::ExtendedColorType::L8)?;
+        let bent = texels.bent.map(|rgb| png(sheet, rgb.as_flattened(), image::ExtendedColorType::Rgb8));
+        Ok(Images { repeats: sheet.repeats, visibility, bent: bent.transpose()? })
     };
-    Ok(Images { repeats: sheet.repeats, visibility, bent })
+    layout.sheets.iter().zip(baked).map(encode).collect()
 }
 
 /// A number 0 … 1 as a code, rounded.

@@ -110,6 +110,14 @@ pub(crate) fn unwrap(
     .context(
         "texture coordinates cannot be made; try --texture-size, --texel or --margin, or --into vertex",
     )?;
+    // Margins are known only now: small images hold little else.
+    if f64::from(atlas.page_count) > MOST_IMAGES {
+        bail!(
+            "new texture coordinates with their margins would need {} images of {page_size}x{page_size}, more than \
+             {MOST_IMAGES}; try a larger --texture-size, a smaller --margin, a longer --texel, or --into vertex",
+            atlas.page_count
+        );
+    }
     layout.texel_m = Some(1.0 / f64::from(atlas.texels_per_unit));
     // A page that is half empty is cut, so that sides are powers of two.
     let (width, cropped) = (atlas.width, atlas.height);

@@ -4,6 +4,8 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod options;
+mod outputs;
+mod readers;
 mod values;
 
 use std::path::Path;

@@ -4,7 +4,7 @@ use super::values::{read, same_scene_when_posed};
 use super::*;
 
 /// Two squares that are one mesh, the second under a lid.
-fn one_of_two_under_a_lid() -> Vec<u8> {
+pub(super) fn one_of_two_under_a_lid() -> Vec<u8> {
     let mut builder = Builder::default();
     let (square, square_indices) = grid(&mut builder, 1.0, 4);
     let (lid, lid_indices) = disc(&mut builder, 0.7, 0.2);
@@ -66,6 +66,56 @@ fn instances_that_differ_get_meshes_of_their_own() {
         glb.json["materials"][1]["pbrMetallicRoughness"],
         glb.json["materials"][0]["pbrMetallicRoughness"]
     );
+}
+
+#[test]
+fn equal_instances_share_a_mesh_however_they_stand() {
+    // Rough ground in a corner between walls: half blocked by itself, everywhere differently.
+    let mut builder = Builder::default();
+    let mut positions: Vec<[f32; 3]> = Vec::new();
+    for z in 0..5u8 {
+        for x in 0..5u8 {
+            let height = f32::from((x * 7 + z * 5 + x * z) % 4) * 0.1;
+            positions.push([f32::from(x) * 0.25, height, f32::from(z) * 0.25]);
+        }
+    }
+    let corners = (0..4u16).flat_map(|z| (0..4u16).map(move |x| z * 5 + x));
+    let mut indices: Vec<u16> = corners.flat_map(|v| [v, v + 5, v + 6, v, v + 6, v + 1]).collect();
+    positions.extend([
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [1.0, 0.8, 0.0],
+        [0.0, 0.8, 0.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 0.8, 1.0],
+    ]);
+    indices.extend([25, 26, 27, 25, 27, 28, 25, 28, 29, 28, 30, 29]);
+    let (positions, indices) = (builder.floats("VEC3", &positions), builder.indices(&indices));
+    let (lid, lid_indices) = disc(&mut builder, 0.7, 0.6);
+    let scene = |nodes: &str| {
+        let mut nodes = nodes.to_owned();
+        nodes.push_str(r#",{"mesh":1,"translation":[-299.5,0,0.5]}"#);
+        format!(
+            r#""nodes":[{nodes}],"meshes":[
+            {{"primitives":[{{"attributes":{{"POSITION":{positions}}},"indices":{indices}}}]}},
+            {{"primitives":[{{"attributes":{{"POSITION":{lid}}},"indices":{lid_indices}}}]}}]"#
+        )
+    };
+    let file = builder.glb(&scene(
+        r#"{"mesh":0},{"mesh":0,"translation":[300,2,7]},
+        {"mesh":0,"translation":[0,0,300],"rotation":[0.1,0.7,0.2,0.67823]},
+        {"mesh":0,"translation":[0,0,-300],"rotation":[-0.5,0.5,0.5,0.5]},
+        {"mesh":0,"translation":[0,90,0],"scale":[-1,1,1]},
+        {"mesh":0,"translation":[-300,0,0]}"#,
+    ));
+    let at = folder(&[("corners.glb", &file)]);
+    for into in ["vertex", "texture"] {
+        let arguments = ["corners.glb", "--into", into, "--radius", "1", "-o", "baked.glb"];
+        let glb = bake(at.path(), &[&arguments[..], &COARSE].concat());
+        let meshes: Vec<usize> = (0..6).map(|node| glb.whole(&format!("/nodes/{node}/mesh"))).collect();
+        assert_eq!(meshes[..5], [0; 5], "{into}: turned, moved and mirrored ones share");
+        assert_ne!(meshes[5], 0, "{into}: the one under the disc does not");
+    }
 }
 
 /// Two quads side by side with texture coordinates; the second is laid at `second`.
@@ -247,42 +297,6 @@ fn files_beside_a_gltf_are_brought_in() {
 }
 
 #[test]
-fn points_are_written_as_ply_and_as_a_recording() {
-    let at = folder(&[("disc.glb", &ground_under_disc(3.0, 8, 0.5, 0.3))]);
-    let out = succeed(at.path(), &["bake", "disc.glb", "--points", "200", "-o", "a.ply", "-o", "b.dapple"]);
-    assert!(out.contains("a.ply") && out.contains("b.dapple"), "{out}");
-    let ply = std::fs::read(at.path().join("a.ply")).unwrap();
-    let end = ply.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
-    let head = std::str::from_utf8(&ply[..end]).unwrap();
-    assert!(head.starts_with("ply\nformat binary_little_endian 1.0\n"), "{head}");
-    let count: usize =
-        head.lines().find_map(|line| line.strip_prefix("element vertex ")).unwrap().parse().unwrap();
-    let rows: Vec<&[u8]> = ply[end..].chunks(35).collect();
-    assert_eq!((rows.len(), rows[count - 1].len()), (count, 35));
-    assert!(count > 800, "{count} points");
-    let exact = 0.09 / (0.25 + 0.09);
-    let mut near = 0;
-    for row in rows {
-        let float = |i: usize| f32::from_le_bytes(row[4 * i..4 * i + 4].try_into().unwrap());
-        let (p, n, visibility) =
-            (Vec3::new(float(0), float(1), float(2)), Vec3::new(float(3), float(4), float(5)), float(6));
-        let instance = i32::from_le_bytes(row[31..].try_into().unwrap());
-        assert!((p.y - [0.0, 0.3][instance as usize]).abs() < 1e-5, "{p}");
-        assert_eq!(n, [Vec3::Y, Vec3::NEG_Y][instance as usize]);
-        assert!((0.0..=1.0).contains(&visibility));
-        assert_eq!(row[28..31], [(visibility * 255.0).round() as u8; 3]);
-        // The occlusion distance of 0.6 m reaches beyond the disc's rim, √(0.5² + 0.3²) away.
-        if instance == 0 && p.length() < 0.12 {
-            near += 1;
-            assert!((f64::from(visibility) - exact).abs() < 0.06, "{visibility} at {p}");
-        }
-    }
-    assert!(near >= 1, "some point is near the middle");
-    let said = succeed(at.path(), &["inspect", "b.dapple", "--scene", "disc.glb"]);
-    assert!(said.contains(&format!("{count} points")) || said.contains(&count.to_string()), "{said}");
-}
-
-#[test]
 fn the_same_bytes_on_any_number_of_threads() {
     let at = folder(&[("two.glb", &one_of_two_under_a_lid())]);
     let arguments = ["two.glb", "--into", "both", "--uv", "new", "--bent-normals", "--texture-size", "128"];
@@ -293,24 +307,6 @@ fn the_same_bytes_on_any_number_of_threads() {
     };
     let one = read("1");
     assert!(one == read("2") && one == read("3"));
-}
-
-#[test]
-fn an_interrupted_bake_leaves_the_old_file_whole() {
-    let file = ground_under_disc(3.0, 60, 0.5, 0.3);
-    let at = folder(&[("disc.glb", &file)]);
-    let arguments = ["bake", "disc.glb", "--rays", "65536", "-o", "disc.glb"];
-    let mut child = dapple(at.path(), &arguments).spawn().unwrap();
-    std::thread::sleep(std::time::Duration::from_millis(700));
-    assert!(child.try_wait().unwrap().is_none(), "still at work");
-    child.kill().unwrap();
-    child.wait().unwrap();
-    assert_eq!(std::fs::read(at.path().join("disc.glb")).unwrap(), file);
-    assert_eq!(files(at.path()).len(), 1);
-    // Left alone it takes the scene's own place.
-    bake(at.path(), &["disc.glb", "--rays", "4", "--texture-size", "32", "-o", "disc.glb"]);
-    assert!(std::fs::read(at.path().join("disc.glb")).unwrap() != file);
-    assert_eq!(partial_files(at.path()).len(), 0);
 }
 
 #[test]
@@ -347,11 +343,36 @@ fn arguments_that_make_no_sense_are_named() {
         (&["--attribute", "_BENT_NORMAL"], &["--attribute"]),
         (&["--instances", "merge"], &["merge", "split"]),
         (&["--threads", "4000"], &["--threads"]),
-        (&["--texel", "1e-9"], &["--texel"]),
+        (&["--texel", "1e-9"], &["--texel is", "0.000001 to 10000 m"]),
+        (&["--texel", "20000"], &["--texel is 20000", "10000 m"]),
+        (&["--texel", "0.00001"], &["--texel 0.00001", "images of 4096x4096", "longer"]),
+        (
+            &["--texel", "0.001", "--texture-size", "16", "--margin", "1"],
+            &["--texel 0.001", "images of 16x16"],
+        ),
     ] {
         fail(at, &[&["bake", "lid.glb", "-o", "x.glb"], arguments].concat(), names);
     }
     assert!(!at.join("x.glb").exists());
+}
+
+#[test]
+fn pieces_that_need_too_many_images_are_refused() {
+    // With its margin each square fills an image; their area alone would fill 30.
+    let mut builder = Builder::default();
+    let square =
+        |i: u16| [[0.0, 0.0], [0.0, 0.8], [0.8, 0.8], [0.8, 0.0]].map(|[x, z]| [x + f32::from(i), 0.0, z]);
+    let positions: Vec<[f32; 3]> = (0..80u16).flat_map(square).collect();
+    let indices: Vec<u16> = (0..80u16).flat_map(|i| [0, 1, 2, 0, 2, 3].map(|k| 4 * i + k)).collect();
+    let (positions, indices) = (builder.floats("VEC3", &positions), builder.indices(&indices));
+    let file = builder.glb(&format!(
+        r#""nodes":[{{"mesh":0}}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":{positions}}},"indices":{indices}}}]}}]"#
+    ));
+    let at = folder(&[("squares.glb", &file)]);
+    let arguments = ["bake", "squares.glb", "--rays", "4", "--texel", "0.1", "--margin", "2", "-o", "x.glb"];
+    let with_side = |side: &'static str| [&arguments[..], &["--texture-size", side]].concat();
+    fail(at.path(), &with_side("16"), &["80 images of 16x16", "more than 64", "--texture-size", "--margin"]);
+    succeed(at.path(), &with_side("256"));
 }
 
 #[test]

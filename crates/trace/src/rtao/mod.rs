@@ -77,7 +77,12 @@ pub fn trace_visibility_with_progress(
     assert_eq!(sites.len(), visibility.len(), "one visibility for each site");
     trace_each(sites, visibility, progress, |site, directions| {
         let mut blocked = 0;
-        let smooth = SmoothSite { site: *site, shading_normal_world: site.normal_world, first_ray: 0 };
+        let smooth = SmoothSite {
+            site: *site,
+            shading_normal_world: site.normal_world,
+            first_ray: 0,
+            axes_world: None,
+        };
         let rays = trace_site(tracer, &smooth, params, directions, |_, mask| blocked += count_blocked(mask));
         if rays == 0 { 1.0 } else { (rays - blocked) as f32 / rays as f32 }
     });
@@ -93,6 +98,10 @@ pub struct SmoothSite {
     /// Index of its first direction in the endless sequence of its key, default 0. Neighbours that are averaged do best to
     /// share a key and divide its sequence among them.
     pub first_ray: u32,
+    /// Two unit vectors that are at right angles to the shading normal and to each other, along which the pattern of directions is
+    /// laid; `None` for some that depend on the normal alone. Given along a body, equal bodies that stand turned or mirrored
+    /// send equal rays.
+    pub axes_world: Option<[Vec3; 2]>,
 }
 
 /// Visibility of a site, and where from light comes to it.
@@ -108,7 +117,7 @@ pub struct BentVisibility {
 
 /// Visibility and the mean of the open directions about *shading* normals, without those that lie behind the face: what varies
 /// smoothly where the surface is drawn smooth, instead of jumping from face to face, and is still 1 where nothing is near.
-/// Where the shading normal is the face's own, the visibility is to the bit that of [`trace_visibility`].
+/// Where the shading normal is the face's own and no axes are given, the visibility is to the bit that of [`trace_visibility`].
 ///
 /// # Panics
 ///
@@ -159,7 +168,7 @@ fn trace_site(
     directions: &mut Vec<Vec3>,
     mut batch: impl FnMut(&[Vec3], &BlockedMask),
 ) -> u32 {
-    let SmoothSite { site, shading_normal_world: about, first_ray } = *smooth;
+    let SmoothSite { site, shading_normal_world: about, first_ray, axes_world } = *smooth;
     let normal = site.normal_world;
     let is_unit = |v: Vec3| v.is_finite() && v != Vec3::ZERO;
     if !is_unit(normal) || !is_unit(about) {
@@ -167,7 +176,7 @@ fn trace_site(
     }
     let rays = params.rays.clamp(1, MAX_RAYS);
     let origin = offset_origin(site.position_world, normal);
-    let (tangent, bitangent) = orthonormal_basis(about);
+    let [tangent, bitangent] = axes_world.unwrap_or_else(|| orthonormal_basis(about).into());
     let site_hash = hash(params.seed, site.key, 0);
     let mut traced = 0;
     for first in (0..rays).step_by(MAX_DIRECTIONS) {

@@ -230,7 +230,12 @@ fn bent(mesh: Mesh, sites: &[Site], rays: u32, radius_m: f32) -> Vec<BentVisibil
     let mut bent = vec![BentVisibility::default(); sites.len()];
     let smooth: Vec<SmoothSite> = sites
         .iter()
-        .map(|s| SmoothSite { site: *s, shading_normal_world: s.normal_world, first_ray: 0 })
+        .map(|s| SmoothSite {
+            site: *s,
+            shading_normal_world: s.normal_world,
+            first_ray: 0,
+            axes_world: None,
+        })
         .collect();
     trace_bent(&tracer, &smooth, &params, &mut bent);
     let mut plain = vec![f32::NAN; sites.len()];
@@ -289,7 +294,12 @@ fn visibility_about_shading_normals() {
         let (scene, pose) = scene_of(mesh);
         let tracer = Tracer::new(&scene, &pose);
         let sites: Vec<SmoothSite> = (0..8)
-            .map(|key| SmoothSite { site: site(at, Vec3::Y, key), shading_normal_world, first_ray: 0 })
+            .map(|key| SmoothSite {
+                site: site(at, Vec3::Y, key),
+                shading_normal_world,
+                first_ray: 0,
+                axes_world: None,
+            })
             .collect();
         let mut bent = vec![BentVisibility::default(); 8];
         let params = RtaoParams { rays, radius_m: UNLIMITED, seed: 3 };
@@ -338,7 +348,7 @@ fn sites_that_share_a_sequence_are_as_good_as_one() {
     let trace = |first_ray: u32, rays: u32| {
         let site = site(Vec3::ZERO, Vec3::Y, 5);
         let mut bent = [BentVisibility::default()];
-        let smooth = SmoothSite { site, shading_normal_world: Vec3::Y, first_ray };
+        let smooth = SmoothSite { site, shading_normal_world: Vec3::Y, first_ray, axes_world: None };
         trace_bent(&tracer, &[smooth], &RtaoParams { rays, radius_m: UNLIMITED, seed: 3 }, &mut bent);
         bent[0].visibility
     };

@@ -6,18 +6,21 @@ use anyhow::{Context, Result, ensure};
 use dapple_metrics::StillFlicker;
 use serde::Serialize;
 
-use super::super::figures::mean;
+use super::super::figures::{FrameError, mean, pooled_psnr};
 use super::super::results::Figure;
 use super::folder::Names;
 use super::measure::{Measured, heat, pair_context, write_map};
 use super::read::Picture;
 use crate::args::CompareArgs;
+use crate::file::write_file;
 use crate::judge::Judge;
-use crate::picture::write_file;
 use crate::progress::Bar;
 
-/// Flicker of the error at which its map is palest.
-const FLICKER_RANGE: f32 = 0.1;
+/// Flicker of the error at which its map is palest, in 1/255.
+const FLICKER_RANGE: f32 = 25.0;
+
+/// Codes from black to white: what flicker is counted in.
+const CODES: f64 = 255.0;
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -29,12 +32,12 @@ struct Report {
     /// Whether any pixel is transparent, so that it was compared over black.
     over_black: bool,
     pixels_per_degree: f32,
-    /// Root mean square change of the reference's luma from picture to picture.
+    /// Root mean square change of the reference's luma from picture to picture, in 1/255.
     reference_flicker: Option<f64>,
     tests: Vec<Test>,
 }
 
-/// One folder. Figures are means over its pictures; PSNR's over those that differ from their reference.
+/// One folder. Figures are means over its pictures; PSNR is that of the mean square error of all their pixels.
 #[derive(Serialize)]
 struct Test {
     folder: PathBuf,
@@ -44,7 +47,7 @@ struct Test {
     flip: Figure,
     hdr_flip: Figure,
     lpips: Figure,
-    /// Root mean square change of luma from picture to picture.
+    /// Root mean square change of luma from picture to picture, in 1/255.
     flicker: Option<f64>,
     /// The same of the difference to the reference's luma.
     error_flicker: Option<f64>,
@@ -60,6 +63,8 @@ struct Line {
     name: String,
     #[serde(flatten)]
     measured: Measured,
+    #[serde(skip)]
+    error: FrameError,
 }
 
 pub(super) fn run(args: &CompareArgs) -> Result<()> {
@@ -92,17 +97,19 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
                 flicker.add(&test).with_context(context)?;
                 error_flicker.add(&error).with_context(context)?;
             }
-            pictures.push(Line { name: name.clone(), measured });
+            let weight = f64::from(reference.width) * f64::from(reference.height);
+            let mse = measured.mse / (f64::from(measured.peak) * f64::from(measured.peak));
+            pictures.push(Line { name: name.clone(), measured, error: FrameError { mse, weight } });
         }
         let mut test = Test::new(folder, pictures, args.worst);
-        (test.flicker, test.error_flicker) = (flicker.rms(), error_flicker.rms());
+        (test.flicker, test.error_flicker) = (codes(&flicker), codes(&error_flicker));
         if let Some(maps) = &args.maps {
             // Folders may have one name.
             let own = match args.tests.len() {
                 1 => maps.clone(),
                 _ => maps.join(format!("{}-{}", number + 1, last_name(folder))),
             };
-            test.write_maps(&own, args, &judge, error_flicker.map())?;
+            test.write_maps(&own, args, &judge, &names.common, error_flicker.map())?;
         }
         tests.push(test);
     }
@@ -114,7 +121,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<()> {
         left_out: names.left_out,
         over_black,
         pixels_per_degree: args.judge.ppd,
-        reference_flicker: reference_flicker.rms(),
+        reference_flicker: codes(&reference_flicker),
         tests,
     };
     if let Some(file) = &args.csv {
@@ -139,7 +146,7 @@ impl Test {
         Test {
             folder: folder.to_owned(),
             equal_pictures: pictures.iter().filter(|line| line.measured.psnr_db.is_none()).count(),
-            psnr_db: figure(&|m| m.psnr_db),
+            psnr_db: pooled_psnr(&pictures.iter().map(|line| line.error).collect::<Vec<_>>()),
             ssim: figure(&|m| m.ssim),
             flip: figure(&|m| m.flip),
             hdr_flip: figure(&|m| m.hdr_flip),
@@ -158,6 +165,7 @@ impl Test {
         own: &Path,
         args: &CompareArgs,
         judge: &Judge,
+        names: &[String],
         flicker: Option<Vec<f32>>,
     ) -> Result<()> {
         let Some(first) = self.pictures.first() else { return Ok(()) };
@@ -167,14 +175,14 @@ impl Test {
                 (Picture::read(&args.reference.join(name))?, Picture::read(&self.folder.join(name))?);
             let found = judge.measure(&reference, &test)?;
             if let Some(map) = found.flip_map {
-                let path = own.join(format!("{}-flip.png", stem(name)));
+                let path = own.join(map_name(name, names));
                 write_map(&path, &reference, &heat(&map))?;
                 self.maps.push(path);
             }
         }
         if let Some(mut flicker) = flicker {
             ensure!(flicker.len() == like.luma().len(), "pictures changed while they were read");
-            flicker.iter_mut().for_each(|v| *v /= FLICKER_RANGE);
+            flicker.iter_mut().for_each(|v| *v *= CODES as f32 / FLICKER_RANGE);
             let path = own.join("flicker.png");
             write_map(&path, &like, &heat(&flicker))?;
             self.maps.push(path);
@@ -189,8 +197,17 @@ fn last_name(folder: &Path) -> String {
     whole.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-fn stem(name: &str) -> String {
-    Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned()
+/// What FLIP's map of a picture is called: by its stem, or by its whole name where that would be the name of another one's.
+fn map_name(name: &str, all: &[String]) -> String {
+    let stem = |name: &str| Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let own = stem(name);
+    let is_same = |other: &String| other != name && (stem(other) == own || *other == own);
+    format!("{}-flip.png", if all.iter().any(is_same) { name } else { &own })
+}
+
+/// A root mean square change in 1/255, as an evaluation gives it.
+fn codes(flicker: &StillFlicker) -> Option<f64> {
+    flicker.rms().map(|rms| CODES * rms)
 }
 
 /// One line a picture.
@@ -199,7 +216,7 @@ fn csv(report: &Report) -> Result<Vec<u8>> {
     csv.write_record(["folder", "picture", "mse", "psnr_db", "ssim", "flip", "hdr_flip", "lpips"])?;
     let text = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
     for test in &report.tests {
-        for Line { name, measured } in &test.pictures {
+        for Line { name, measured, .. } in &test.pictures {
             csv.write_record([
                 &test.folder.display().to_string(),
                 name,
@@ -222,9 +239,10 @@ fn text(report: &Report) -> String {
         Figure { value: Some(value), ci95: None } => format!("{value:.digits$}"),
         Figure { value: None, .. } => "-".to_owned(),
     };
-    let steady = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.5}"));
-    let titles = ["folder", "PSNR dB", "SSIM", "FLIP", "HDR-FLIP", "LPIPS", "flicker", "flicker of error"]
-        .map(str::to_owned);
+    let steady = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
+    let titles =
+        ["folder", "PSNR dB", "SSIM", "FLIP", "HDR-FLIP", "LPIPS", "flicker 1/255", "flicker of error 1/255"]
+            .map(str::to_owned);
     let rows = report.tests.iter().map(|test| {
         let psnr = if test.psnr_db.value.is_none() { "equal".to_owned() } else { cell(test.psnr_db, 2) };
         [
@@ -261,18 +279,18 @@ fn text(report: &Report) -> String {
             out.push(format!("worst in {folder} by FLIP: {}", worst.join(", ")));
         }
         if test.equal_pictures > 0 && test.psnr_db.value.is_some() {
-            out.push(format!("equal in {folder}, and not in its PSNR: {}", test.equal_pictures));
+            out.push(format!("equal in {folder}: {} of {}", test.equal_pictures, test.pictures.len()));
         }
         let maps = test.maps.iter().map(|path| path.display().to_string());
         out.extend(maps.map(|path| format!("written: {path}")));
     }
     if let Some(flicker) = report.reference_flicker {
         out.push(format!(
-            "flicker is the RMS change of luma from picture to picture, {flicker:.5} in {}; maps end at {FLICKER_RANGE}",
+            "flicker is the RMS change of luma from picture to picture in 1/255, {flicker:.3} in {}; maps end at {FLICKER_RANGE}",
             report.reference.display()
         ));
     }
-    if report.tests.iter().any(|test| test.psnr_db.ci95.is_some()) {
+    if report.tests.iter().any(|test| test.flip.ci95.or(test.hdr_flip.ci95).is_some()) {
         out.push("± is half of the 95 % interval of a mean over independent pictures".to_owned());
     }
     if report.over_black {

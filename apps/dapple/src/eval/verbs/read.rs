@@ -6,6 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use image::{DynamicImage, ImageReader, Limits};
 
+use crate::exr_file::{Gray, read_gray};
 use crate::source::read_limited;
 
 /// Endings of files that can be read.
@@ -46,6 +47,12 @@ impl Picture {
     }
 
     fn decode(bytes: Vec<u8>) -> Result<Picture> {
+        // Linear pictures of one number, such as visibility, which `image` does not read.
+        if let Some(Gray { width, height, values, transparent }) = read_gray(&bytes, MAX_SIDE)? {
+            check_size(width, height)?;
+            let values = values.into_iter().flat_map(|v| [v; 3]).collect();
+            return Ok(Picture { width, height, values: Values::Linear(values), transparent });
+        }
         let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
         let mut limits = Limits::default();
         limits.max_image_width = Some(MAX_SIDE);
@@ -54,9 +61,7 @@ impl Picture {
         reader.limits(limits);
         let decoded = reader.decode()?;
         let (width, height) = (decoded.width(), decoded.height());
-        if width == 0 || height == 0 {
-            bail!("it has no pixels ({width} x {height})");
-        }
+        check_size(width, height)?;
         let is_linear = matches!(decoded, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
         let has_alpha = decoded.color().has_alpha();
         let (values, transparent) = if is_linear {
@@ -88,6 +93,13 @@ impl Picture {
         let weigh = |p: &[f32; 3]| 0.2126 * p[0] + 0.7152 * p[1] + 0.0722 * p[2];
         self.values().as_chunks::<3>().0.iter().map(weigh).collect()
     }
+}
+
+fn check_size(width: u32, height: u32) -> Result<()> {
+    if width == 0 || height == 0 {
+        bail!("it has no pixels ({width} x {height})");
+    }
+    Ok(())
 }
 
 /// Encoded values as bytes; those of 8 bits are what they were.
@@ -138,6 +150,22 @@ mod tests {
         let read = Picture::decode(exr.into_inner()).unwrap();
         assert_eq!(read.values, Values::Linear(vec![0.5, 1000.0, 0.001]));
         assert!((read.luma()[0] - (0.1063 + 715.2 + 0.0000722)).abs() < 1e-3);
+    }
+
+    #[test]
+    fn pictures_of_one_number_are_gray() {
+        let folder = tempfile::TempDir::new().unwrap();
+        let file = folder.path().join("gray.exr");
+        crate::exr_file::write_gray(&file, 3, 2, &[0.0, 0.25, 0.5, 0.75, 1.0, 7.5]).unwrap();
+        let bytes = std::fs::read(&file).unwrap();
+        let read = Picture::decode(bytes.clone()).unwrap();
+        assert_eq!((read.width, read.height, read.transparent), (3, 2, false));
+        let expected = [0.0, 0.25, 0.5, 0.75, 1.0, 7.5].into_iter().flat_map(|v| [v; 3]).collect();
+        assert_eq!(read.values, Values::Linear(expected));
+        for cut in [5, 60, bytes.len() - 4] {
+            assert!(Picture::decode(bytes[..cut].to_vec()).is_err(), "cut at {cut}");
+        }
+        assert!(read_gray(&bytes, 2).is_err(), "too large");
     }
 
     #[test]
