@@ -1,9 +1,9 @@
-//! Rectangles in an atlas: squares of 64 × 64 texels, each cut into blocks of one size.
+//! Rectangles in an atlas, by halving: each block is the atlas, or half of another, or a half of that.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Side of a square, and of the largest block, texels.
-pub(super) const SQUARE: u32 = 64;
+/// Longest side of a block, texels.
+pub(super) const MOST_SIDE: u32 = 256;
 /// Least side of a block, texels.
 pub(super) const LEAST_SIDE: u32 = 2;
 
@@ -20,22 +20,34 @@ pub(in crate::eval) struct Block {
     pub(super) height: u16,
 }
 
+impl Block {
+    fn size(self) -> [u16; 2] {
+        [self.width, self.height]
+    }
+
+    /// Both halves along the axis.
+    fn halves(self, axis: usize) -> [Block; 2] {
+        let mut halves = [self; 2];
+        if axis == 0 {
+            halves.iter_mut().for_each(|half| half.width /= 2);
+            halves[1].x += halves[0].width;
+        } else {
+            halves.iter_mut().for_each(|half| half.height /= 2);
+            halves[1].y += halves[0].height;
+        }
+        halves
+    }
+}
+
 /// Which texels are in use.
 #[derive(Debug, Clone)]
 pub(super) struct Atlas {
     pub(super) width: u32,
     pub(super) height: u32,
-    /// Squares that belong to no size.
-    free_squares: BTreeSet<u32>,
-    sizes: BTreeMap<[u16; 2], Size>,
-}
-
-/// Squares that are cut into one size of blocks.
-#[derive(Debug, Clone, Default)]
-struct Size {
-    /// By square, then by place in it.
-    free: BTreeSet<(u32, u32)>,
-    used_of_square: BTreeMap<u32, u32>,
+    /// By size.
+    free: BTreeMap<[u16; 2], BTreeSet<Block>>,
+    /// For every half what it is a half of.
+    whole: BTreeMap<Block, Block>,
 }
 
 impl Atlas {
@@ -43,44 +55,58 @@ impl Atlas {
     pub(super) fn new(texels: u64) -> Atlas {
         let fits = |size: &&[u32; 2]| u64::from(size[0]) * u64::from(size[1]) >= texels;
         let [width, height] = *SIZES.iter().find(fits).unwrap_or(&SIZES[SIZES.len() - 1]);
-        let squares = (width / SQUARE) * (height / SQUARE);
-        Atlas { width, height, free_squares: (0..squares).collect(), sizes: BTreeMap::new() }
+        let all = Block { x: 0, y: 0, width: width as u16, height: height as u16 };
+        Atlas { width, height, free: [(all.size(), [all].into())].into(), whole: BTreeMap::new() }
     }
 
-    /// A block with sides that are powers of two, 2 … 64; `None` if there is no room.
+    /// A block with sides that are powers of two, 2 … 256; `None` if there is no room.
     pub(super) fn take(&mut self, width: u32, height: u32) -> Option<Block> {
-        let key = [width as u16, height as u16];
-        let size = self.sizes.entry(key).or_default();
-        if size.free.is_empty() {
-            let square = self.free_squares.pop_first()?;
-            let places = (SQUARE / width) * (SQUARE / height);
-            size.free.extend((0..places).map(|place| (square, place)));
+        let wanted = [width as u16, height as u16];
+        // Of the smallest blocks that are large enough the first.
+        let large_enough = |size: &&[u16; 2]| size[0] >= wanted[0] && size[1] >= wanted[1];
+        let area = |size: &[u16; 2]| u32::from(size[0]) * u32::from(size[1]);
+        let size = *self.free.keys().filter(large_enough).min_by_key(|size| area(size))?;
+        let mut block = self.free.get(&size)?.first().copied()?;
+        self.remove(block);
+        while block.size() != wanted {
+            // Across the side that is the longer one beside what is wanted, so that what is left is as square.
+            let over = [0, 1].map(|axis| block.size()[axis] / wanted[axis]);
+            let halves = block.halves(usize::from(over[1] > over[0]));
+            self.whole.extend(halves.map(|half| (half, block)));
+            self.insert(halves[1]);
+            block = halves[0];
         }
-        let (square, place) = size.free.pop_first()?;
-        *size.used_of_square.entry(square).or_default() += 1;
-        let (row, across) = (self.width / SQUARE, SQUARE / width);
-        Some(Block {
-            x: (square % row * SQUARE + place % across * width) as u16,
-            y: (square / row * SQUARE + place / across * height) as u16,
-            width: key[0],
-            height: key[1],
-        })
+        Some(block)
     }
 
     /// Gives a block back.
     pub(super) fn give(&mut self, block: Block) {
-        let (x, y) = (u32::from(block.x), u32::from(block.y));
-        let (width, height) = (u32::from(block.width), u32::from(block.height));
-        let square = y / SQUARE * (self.width / SQUARE) + x / SQUARE;
-        let place = y % SQUARE / height * (SQUARE / width) + x % SQUARE / width;
-        let Some(size) = self.sizes.get_mut(&[block.width, block.height]) else { return };
-        size.free.insert((square, place));
-        if let Some(used) = size.used_of_square.get_mut(&square) {
-            *used -= 1;
-            if *used == 0 {
-                size.used_of_square.remove(&square);
-                size.free.retain(|(other, _)| *other != square);
-                self.free_squares.insert(square);
+        let mut block = block;
+        while let Some(&whole) = self.whole.get(&block) {
+            let axis = usize::from(whole.width == block.width);
+            let halves = whole.halves(axis);
+            let other = if halves[0] == block { halves[1] } else { halves[0] };
+            if !self.free.get(&other.size()).is_some_and(|free| free.contains(&other)) {
+                break;
+            }
+            self.remove(other);
+            for half in halves {
+                self.whole.remove(&half);
+            }
+            block = whole;
+        }
+        self.insert(block);
+    }
+
+    fn insert(&mut self, block: Block) {
+        self.free.entry(block.size()).or_default().insert(block);
+    }
+
+    fn remove(&mut self, block: Block) {
+        if let Some(free) = self.free.get_mut(&block.size()) {
+            free.remove(&block);
+            if free.is_empty() {
+                self.free.remove(&block.size());
             }
         }
     }
@@ -92,10 +118,10 @@ mod tests {
 
     #[test]
     fn blocks_never_overlap_and_all_room_comes_back() {
-        let mut atlas = Atlas::new(1);
-        assert_eq!((atlas.width, atlas.height), (256, 256));
+        let mut atlas = Atlas::new(1 << 20);
+        assert_eq!((atlas.width, atlas.height), (1024, 1024));
         let mut held: Vec<Block> = Vec::new();
-        let mut owner = vec![false; 256 * 256];
+        let mut owner = vec![false; 1024 * 1024];
         let mut state = 1u64;
         let mut next = |below: u64| {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -104,7 +130,7 @@ mod tests {
         let mark = |owner: &mut Vec<bool>, block: Block, used: bool| {
             for y in block.y..block.y + block.height {
                 for x in block.x..block.x + block.width {
-                    let texel = &mut owner[usize::from(y) * 256 + usize::from(x)];
+                    let texel = &mut owner[usize::from(y) * 1024 + usize::from(x)];
                     assert_ne!(*texel, used, "{block:?}");
                     *texel = used;
                 }
@@ -112,7 +138,7 @@ mod tests {
         };
         for _ in 0..4000 {
             if next(3) > 0 || held.is_empty() {
-                if let Some(block) = atlas.take(2 << next(6), 2 << next(6)) {
+                if let Some(block) = atlas.take(2 << next(8), 2 << next(8)) {
                     mark(&mut owner, block, true);
                     held.push(block);
                 }
@@ -125,9 +151,9 @@ mod tests {
         for block in held {
             atlas.give(block);
         }
-        assert_eq!(atlas.free_squares.len(), 16);
+        assert!(atlas.whole.is_empty() && atlas.free.len() == 1, "all halves are whole again");
         // Full of the largest: there is no room for more.
-        assert_eq!((0..20).filter_map(|_| atlas.take(64, 64)).count(), 16);
+        assert_eq!((0..20).filter_map(|_| atlas.take(256, 256)).count(), 16);
         assert_eq!(atlas.take(2, 2), None);
     }
 

@@ -124,11 +124,11 @@ impl SasClient {
             .collect()
     }
 
-    /// Bilinear between the centres of texels, of which the outermost lie on the patch's edges.
+    /// Bilinear between the centres of texels; beyond the outermost ones as there.
     fn look(&self, block: Block, [u, v]: [f32; 2]) -> f32 {
         let row = self.size.0 as usize;
         let split = |at: f32, side: u16| {
-            let at = at * f32::from(side - 1);
+            let at = (at * f32::from(side) - 0.5).clamp(0.0, f32::from(side - 1));
             let low = (at as u16).min(side - 2);
             (usize::from(low), at - f32::from(low))
         };

@@ -10,7 +10,7 @@ use dapple_scene::{Aabb, Pose, PosedCamera, Projection, Scene};
 use dapple_trace::Tracer;
 use dapple_trace::rtao::{RtaoParams, Site, trace_visibility};
 
-use super::atlas::{Atlas, Block, LEAST_SIDE, SQUARE};
+use super::atlas::{Atlas, Block, LEAST_SIDE, MOST_SIDE};
 use super::patches::Patch;
 use super::video::Sender;
 use super::{Blocks, Numbers, SasFrame, SasStep};
@@ -33,15 +33,15 @@ const MARGIN: f32 = 0.349_066;
 /// Half an angle of view that is not exceeded, radians (85°).
 const WIDEST: f32 = 1.483_53;
 /// Patches keep their texels for so long while they are not seen, seconds.
-const KEPT_S: f64 = 1.0;
+const KEPT_S: f64 = 2.0;
 /// Longest side of the picture that says what is seen, pixels.
-const MOST_SIDE: u32 = 8192;
+const MOST_PIXELS: u32 = 8192;
+/// Samples of it along each axis of a pixel.
+const SAMPLES: u32 = 2;
 /// Nothing counts as nearer, metres.
 const LEAST_DISTANCE_M: f32 = 1e-3;
 /// The atlas has so many times the texels of the first picture.
 const SPARE: f64 = 2.0;
-/// How far inside of its patch a place on an edge is traced, as a part of the patch: a wall that it stands on must not hide it.
-const INSET: f32 = 0.02;
 
 /// Patches that are seen, by number: the most pixels that a metre of it takes.
 type Seen = BTreeMap<u32, f32>;
@@ -136,9 +136,9 @@ impl SasServer {
         self.held.values().map(|h| u64::from(h.block.width) * u64::from(h.block.height)).sum()
     }
 
-    /// The texels of each patch that has some.
+    /// The texels of each patch that the last step saw.
     #[cfg(test)]
-    pub(super) fn texels_by_patch(&self) -> Vec<(u32, Vec<u8>)> {
+    pub(super) fn texels_seen(&self) -> BTreeMap<u32, Vec<u8>> {
         let of = |block: Block| {
             let row = |y: u16| {
                 let first = usize::from(y) * self.atlas.width as usize + usize::from(block.x);
@@ -146,7 +146,8 @@ impl SasServer {
             };
             (block.y..block.y + block.height).flat_map(row).copied().collect()
         };
-        self.held.iter().map(|(&number, held)| (number, of(held.block))).collect()
+        let seen = self.held.iter().filter(|(_, held)| held.seen == self.step);
+        seen.map(|(&number, held)| (number, of(held.block))).collect()
     }
 
     /// Brings the scene to `now_s`, shades what `camera` may see soon, and encodes the atlas, if anything in it is another than in
@@ -180,9 +181,11 @@ impl SasServer {
         };
         let is_perspective = matches!(camera.projection, Projection::Perspective { .. });
         let (camera, growth) = extended(camera, width as f32 / height as f32);
-        let side = |pixels: u32, growth: f32| ((pixels as f32 * growth).ceil() as u32).clamp(1, MOST_SIDE);
-        let (width, height) = (side(width, growth[0]), side(height, growth[1]));
-        let gbuffer = rasterize(&self.scene, pose, &camera, width, height, 1)?;
+        let side = |pixels: u32, growth: f32| ((pixels as f32 * growth).ceil() as u32).clamp(1, MOST_PIXELS);
+        // Other samples in each step, so that what lies between them is found in time.
+        let shift = (5 * self.step % 8) as u32;
+        let (width, height) = (side(width, growth[0]) + shift, side(height, growth[1]) + shift);
+        let gbuffer = rasterize(&self.scene, pose, &camera, width, height, SAMPLES)?;
         let eye = camera.eye_world();
         let found = gbuffer.map_surfaces(&self.scene, pose, |index, surface| {
             let sample = gbuffer.samples()[index];
@@ -224,7 +227,7 @@ impl SasServer {
         patch.sides(self.corner(pose, instance)).map(|metres| {
             let texels = metres * pixels_a_metre / self.params.bias as f32;
             // Not a number becomes the least.
-            (texels.min(SQUARE as f32).ceil() as u32).next_power_of_two().clamp(LEAST_SIDE, SQUARE)
+            (texels.min(MOST_SIDE as f32).ceil() as u32).next_power_of_two().clamp(LEAST_SIDE, MOST_SIDE)
         })
     }
 
@@ -314,15 +317,12 @@ impl SasServer {
             let corner = self.corner(pose, instance);
             let flip = Mat3::from(pose.instances[instance].world_from_mesh.matrix3).determinant() < 0.0;
             let Block { x, y, width, height } = held.block;
-            let at = |i: u16, side: u16| {
-                let at = f32::from(i) / f32::from(side - 1);
-                INSET + (1.0 - 2.0 * INSET) * at
-            };
+            let at = |i: u16, side: u16| (f32::from(i) + 0.5) / f32::from(side);
             for (j, i) in (0..height).flat_map(|j| (0..width).map(move |i| (j, i))) {
                 let (place, normal) = patch.surface([at(i, width), at(j, height)], &corner);
                 let normal_world = if is_back != flip { -normal } else { normal };
                 // Keyed by the place in the patch, so that a texel that is traced again gets the same rays.
-                let key = u64::from(number) << 12 | u64::from(j) << 6 | u64::from(i);
+                let key = u64::from(number) << 16 | u64::from(j) << 8 | u64::from(i);
                 sites.push(Site { position_world: place, normal_world, key });
                 texels.push((usize::from(y + j)) * self.atlas.width as usize + usize::from(x + i));
             }
