@@ -246,6 +246,10 @@ pub(crate) enum Method {
     PsaoPaper,
     /// The paper's scheme with least squares at every sample.
     PsaoPaperMls,
+    /// Shading atlas streaming, with so many pixels of a side to a texel.
+    Sas {
+        bias: u32,
+    },
     Rtao {
         rays: u32,
     },
@@ -273,6 +277,7 @@ impl std::fmt::Display for Method {
             Method::PsaoHat { radius } => write!(f, "psao-hat-{radius}"),
             Method::PsaoPaper => write!(f, "psao-paper"),
             Method::PsaoPaperMls => write!(f, "psao-paper-mls"),
+            Method::Sas { bias } => write!(f, "sas-{bias}"),
             Method::Rtao { rays } => write!(f, "rtao-{rays}"),
             Method::None => write!(f, "none"),
         }
@@ -294,12 +299,14 @@ impl FromStr for Method {
             _ => {
                 let rays = s.strip_prefix("rtao-").and_then(|r| r.parse().ok());
                 let radius = s.strip_prefix("psao-hat-").and_then(|r| r.parse::<f32>().ok());
-                match (rays, radius) {
-                    (Some(rays @ 1..=65536), _) => Ok(Method::Rtao { rays }),
-                    (_, Some(radius)) if (0.1..=8.0).contains(&radius) => Ok(Method::PsaoHat { radius }),
+                let bias = s.strip_prefix("sas-").and_then(|b| b.parse().ok());
+                match (rays, radius, bias) {
+                    (Some(rays @ 1..=65536), ..) => Ok(Method::Rtao { rays }),
+                    (_, Some(radius), _) if (0.1..=8.0).contains(&radius) => Ok(Method::PsaoHat { radius }),
+                    (.., Some(bias @ 1..=1024)) => Ok(Method::Sas { bias }),
                     _ => Err(
                         "known methods: psao, psao-mls, psao-hat, psao-hat-F with its radius times F from 0.1 to 8, \
-                              psao-paper, psao-paper-mls, rtao-R with R from 1 to 65536 (rtao-16), none"
+                              psao-paper, psao-paper-mls, sas-B with B from 1 to 1024, rtao-R with R from 1 to 65536 (rtao-16), none"
                             .into(),
                     ),
                 }

@@ -10,9 +10,9 @@ use dapple_render::psao::{Hat, Kernel};
 use dapple_trace::rtao::{RtaoParams, trace_visibility};
 use serde::{Deserialize, Serialize};
 
+use super::ends::AnyServer;
 use super::figures::{FrameError, jackknife, mean, mean_of_all, pooled_psnr, root_mean_square};
 use super::pair::{Pair, Start, Starts};
-use super::paper::AnyServer;
 use super::plan::CLIENT_HZ;
 use super::results::{Figure, FrameRow, Machine, Params, Row, Settling, Times, Truth};
 use super::settle::settle;
@@ -27,6 +27,8 @@ use crate::picture::{Compared, Shown, sites};
 pub(super) enum Job {
     /// One server, looked up in several ways: all of the paper's scheme, or none.
     Points { points_per_m2: f32, hz: f64, methods: Vec<Method> },
+    /// A method with a server of its own.
+    Served { method: Method, hz: f64 },
     /// A method without a server.
     Alone(Method),
 }
@@ -75,7 +77,14 @@ pub(super) fn jobs(stage: &Stage<'_>) -> Vec<Job> {
             }
         }
     }
-    jobs.extend(alone.into_iter().map(Job::Alone));
+    for method in alone {
+        match method {
+            Method::Sas { .. } => {
+                jobs.extend(settings.hz.iter().map(|&hz| Job::Served { method, hz }));
+            }
+            _ => jobs.push(Job::Alone(method)),
+        }
+    }
     jobs
 }
 
@@ -87,6 +96,7 @@ impl Job {
                 let scheme = if self.is_paper() { "paper" } else { "points" };
                 format!("{scheme}-{points_per_m2}-{hz}hz")
             }
+            Job::Served { method, hz } => format!("{method}-{hz}hz"),
             Job::Alone(method) => method.to_string(),
         }
     }
@@ -104,7 +114,7 @@ impl Job {
     fn methods(&self) -> Vec<Method> {
         match self {
             Job::Points { methods, .. } => methods.clone(),
-            Job::Alone(method) => vec![*method],
+            Job::Served { method, .. } | Job::Alone(method) => vec![*method],
         }
     }
 
@@ -118,6 +128,11 @@ impl Job {
             }
             Job::Alone(Method::Rtao { rays }) => {
                 pictures * (40.0 + 2.0 * f64::from(stage.settings.rays_per_sample(*rays)))
+            }
+            // A picture's worth of texels, of which some change in each step.
+            Job::Served { hz, .. } => {
+                let texels = stage.samples() as f64 * f64::from(stage.settings.point_rays);
+                pictures * 40.0 + texels * (1.0 + 0.05 * hz * stage.seconds)
             }
             Job::Alone(_) => pictures * 40.0,
         }
@@ -136,12 +151,16 @@ impl Job {
                 let start = Start::new(stage, *points_per_m2);
                 let server = starts.server(stage.loaded, &start, &|part| progress(0.3 * part))?;
                 let server = AnyServer::new(server, self.is_paper(), stage.settings.threshold)?;
-                let pair = Pair::new(server, (*points_per_m2, *hz), stage, desk.record)?;
+                let pair = Pair::new(server, (Some(*points_per_m2), *hz), stage, desk.record)?;
                 if self.methods().contains(&Method::Psao) {
                     // Made once a session, so not what a picture costs.
                     pair.client.make_atlas();
                 }
                 Some(pair)
+            }
+            Job::Served { method, hz } => {
+                let server = AnyServer::served(stage, *method, *hz, starts.tracer())?;
+                Some(Pair::new(server, (None, *hz), stage, None)?)
             }
             Job::Alone(_) => None,
         };
@@ -193,6 +212,8 @@ fn reconstruction(method: Method) -> Option<Reconstruction> {
         Method::PsaoMls | Method::PsaoPaperMls => Some(Kernel::default().into()),
         Method::PsaoPaper => Some(Kernel::Hat(Hat::default()).into()),
         Method::PsaoHat { radius } => Some(Kernel::Hat(Hat { radius, ..Hat::default() }).into()),
+        // Its client has one way only, which the name of another stands for.
+        Method::Sas { .. } => Some(Reconstruction::Atlas),
         Method::Rtao { .. } | Method::None => None,
     }
 }
@@ -336,10 +357,10 @@ impl Line {
             .collect();
         let picture: Vec<FrameError> = self.frames.iter().map(|f| FrameError::new(f.psnr_db, 1.0)).collect();
         let params = Params {
-            points_per_m2: pair.map(|p| p.points_per_m2),
+            points_per_m2: pair.and_then(|p| p.points_per_m2),
             hz: pair.map(|p| p.hz),
             point_rays: pair.map(|_| settings.point_rays),
-            threshold: pair.map(|_| settings.threshold),
+            threshold: pair.and_then(|p| p.points_per_m2).map(|_| settings.threshold),
             ray_budget: pair.and(settings.step.ray_budget),
             rays_still: pair.map(|_| settings.step.rays_still).filter(|rays| *rays > 0),
             rays_per_pixel: match self.method {

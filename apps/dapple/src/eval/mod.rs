@@ -5,12 +5,12 @@
 
 mod advice;
 mod columns;
+mod ends;
 mod export;
 mod figures;
 mod job;
 mod journal;
 mod pair;
-mod paper;
 mod plan;
 pub(crate) mod quality;
 mod reference;
@@ -18,6 +18,8 @@ mod report;
 mod results;
 mod run;
 mod samples;
+#[cfg(feature = "sas")]
+mod sas;
 mod settle;
 mod smoke;
 mod stage;

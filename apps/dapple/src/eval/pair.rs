@@ -10,7 +10,7 @@ use dapple_trace::Tracer;
 use dapple_trace::psao::generate::{GenerateParams, generate_points};
 use dapple_trace::psao::update::{ConvexVolume, StepInput, UpdateParams};
 
-use super::paper::{AnyClient, AnyServer};
+use super::ends::{AnyClient, AnyServer};
 use super::results::Steps;
 use super::stage::Stage;
 use crate::light::microseconds;
@@ -124,7 +124,8 @@ impl Starts {
 /// A server, its client, and what was counted between them.
 pub(super) struct Pair {
     pub(super) client: AnyClient,
-    pub(super) points_per_m2: f32,
+    /// Absent for a method that has none.
+    pub(super) points_per_m2: Option<f32>,
     pub(super) hz: f64,
     pub(super) snapshot_bytes: u64,
     /// Bytes of each step's update.
@@ -157,12 +158,12 @@ impl Pair {
     /// A client joins the server at its start. `record` is the name of a recording to make.
     pub(super) fn new(
         mut server: AnyServer,
-        (points_per_m2, hz): (f32, f64),
+        (points_per_m2, hz): (Option<f32>, f64),
         stage: &Stage<'_>,
         record: Option<&str>,
     ) -> Result<Pair> {
-        let mut client = AnyClient::of(&server);
-        let snapshot = server.join()?;
+        let mut client = AnyClient::of(&server)?;
+        let snapshot = server.join(stage)?;
         client.receive(&snapshot).context("the client refused the server's snapshot")?;
         let mut recording = None;
         if let Some(name) = record {
@@ -170,7 +171,7 @@ impl Pair {
             let scene_hash = server.scene().hash().0;
             let header = RecordingHeader { scene_hash, name: name.to_owned(), duration_us };
             let (mut recorder, mut bytes) = Recorder::new(&header).context("--record")?;
-            bytes.extend(recorder.frame(0, &snapshot)?);
+            bytes.extend(recorder.frame(0, &snapshot.bytes)?);
             recording = Some(Recording { recorder, bytes, duration_us });
         }
         let rays = server.points() * u64::from(stage.settings.point_rays);
@@ -178,7 +179,7 @@ impl Pair {
             client,
             points_per_m2,
             hz,
-            snapshot_bytes: snapshot.len() as u64,
+            snapshot_bytes: snapshot.bytes.len() as u64,
             step_bytes: Vec::new(),
             rays,
             steps: Steps::default(),
@@ -204,19 +205,19 @@ impl Pair {
             let input = StepInput { ray_budget: self.ray_budget, interest: &interest };
             let report = self.server.step(tick_s, &input, stage)?;
             self.server_seconds += start.elapsed().as_secs_f64();
-            self.rays += report.counts.rays();
+            self.rays += report.rays;
             self.steps.add(&report.counts);
             let start = Instant::now();
             let mut bytes = 0;
-            if let Some(frame) = &report.frame {
-                bytes = frame.len() as u32;
+            if let Some(packet) = &report.packet {
+                bytes = packet.bytes.len() as u32;
                 changed = true;
-                self.client.receive(frame).context("the client refused the server's frame")?;
+                self.client.receive(packet).context("the client refused the server's frame")?;
             }
             self.apply_seconds += start.elapsed().as_secs_f64();
-            if let (Some(recording), Some(frame)) = (&mut self.recording, &report.frame) {
+            if let (Some(recording), Some(packet)) = (&mut self.recording, &report.packet) {
                 let time_us = microseconds(tick_s).min(recording.duration_us);
-                recording.bytes.extend(recording.recorder.frame(time_us, frame)?);
+                recording.bytes.extend(recording.recorder.frame(time_us, &packet.bytes)?);
             }
             self.step_bytes.push(bytes);
         }
@@ -227,10 +228,10 @@ impl Pair {
         let interest = interest(time_s, self.hz, self.ray_budget, stage);
         let input = StepInput { ray_budget: self.ray_budget, interest: &interest };
         let report = self.server.step(time_s, &input, stage)?;
-        if let Some(frame) = &report.frame {
-            self.client.receive(frame).context("the client refused the server's frame")?;
+        if let Some(packet) = &report.packet {
+            self.client.receive(packet).context("the client refused the server's frame")?;
         }
-        Ok(StepAt { changed: report.frame.is_some(), backlog: report.counts.backlog })
+        Ok(StepAt { changed: report.packet.is_some(), backlog: report.counts.backlog })
     }
 
     pub(super) fn points(&self) -> u64 {
