@@ -122,12 +122,10 @@ impl AnyServer {
         Ok(AnyServer::Sas(Box::new(server)))
     }
 
-    /// Without the feature that brings a video codec there is none.
+    /// Settings refuse such methods where there is no video codec.
     #[cfg(not(feature = "sas"))]
     pub(super) fn served(_: &Stage<'_>, method: Method, _: f64, _: &Tracer) -> Result<AnyServer> {
-        bail!(
-            "{method} needs a video codec: build the program with `--features sas`, or leave it out of --methods"
-        )
+        bail!("{method} has no server in this program")
     }
 
     /// What a client gets on joining at the start.

@@ -107,6 +107,14 @@ impl Settings {
         if let Some(bad) = self.points_per_m2.iter().find(|n| !(n.is_finite() && **n > 0.0)) {
             bail!("--points has {bad}, must be above 0");
         }
+        if let Some(method) = self.methods.iter().find(|m| matches!(m, Method::Sas { .. }))
+            && !cfg!(feature = "sas")
+        {
+            bail!(
+                "{method} needs a video codec, which this program was built without: build it with `--features sas`, or leave \
+                 {method} out of --methods"
+            );
+        }
         for (name, empty) in [
             ("--methods", self.methods.is_empty()),
             ("--hz", self.hz.is_empty()),
