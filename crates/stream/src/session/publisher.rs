@@ -24,7 +24,7 @@ pub struct PublisherConfig {
     pub precision: Precision,
 }
 
-/// How exact deltas are, in 255ths of visibility. Snapshots are exact.
+/// How exact deltas are, in 255ths of visibility. The first snapshot of a layout is exact; others hold what the deltas came to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Precision {
     /// What subscribers hold is at most this far from what was published, always: a change that leaves a point within is not
@@ -126,9 +126,9 @@ impl Publisher {
                 let held = state.store.visibility();
                 match Goal::new(held, store.visibility(), precision.tolerance, precision.step) {
                     None => (None, 0),
-                    Some(_) if full > 0 && state.deltas >= full => {
-                        let changed = held.iter().zip(store.visibility()).filter(|(a, b)| a != b).count();
-                        state.store = store.clone();
+                    Some(goal) if full > 0 && state.deltas >= full => {
+                        // To the same values as without a new group: what subscribers hold does not depend on when groups start.
+                        let (_, changed) = state.advance(epoch, goal);
                         (Some(state.start_group(epoch, &self.scene_hash)), changed)
                     }
                     Some(goal) => {

@@ -1,3 +1,5 @@
+//! The rival from end to end, on a small scene.
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
