@@ -75,13 +75,13 @@ fn a_picture_between_two_updates_shows_walkers_with_the_light_of_the_last_one() 
         .collect();
     let kept = rms(&posed, &rest, &still);
     eprintln!("elsewhere: {kept:.4}");
-    // Packed normals are up to 17° off, which counts where a fit looks across thin things; and full cells lose points.
-    assert!(kept < 0.17, "{kept}");
+    assert!(kept < 0.09, "{kept}");
     let hat = Kernel::Hat(Hat::default());
     let rest = own_client.visibility(&drawn, &Reconstruction::Direct(hat));
     let kept = rms(&client.visibility(&drawn, &hat), &rest, &still);
     eprintln!("elsewhere, hat: {kept:.4}");
-    assert!(kept < 0.12, "{kept}");
+    // Full cells lose points, and where none is left near enough eq. 4 says open.
+    assert!(kept < 0.17, "{kept}");
 }
 
 #[test]
