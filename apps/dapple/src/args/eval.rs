@@ -126,7 +126,7 @@ pub(crate) struct Options {
     /// Rays a point, 1 to 256 [default: 64].
     #[arg(long, value_name = "N")]
     pub(crate) point_rays: Option<u32>,
-    /// Change of a point's visibility (0 to 255) that is not sent [default: 4].
+    /// How far the visibility that is sent may be off, 0 to 127 of 255; smaller changes are not sent [default: 4].
     #[arg(long, value_name = "T")]
     pub(crate) threshold: Option<u8>,
     /// Seed of all random numbers [default: 1].

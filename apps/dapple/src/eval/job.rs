@@ -361,8 +361,11 @@ impl Line {
             hz: pair.map(|p| p.hz),
             point_rays: pair.map(|_| settings.point_rays),
             threshold: pair.and_then(|p| p.points_per_m2).map(|_| settings.threshold),
-            ray_budget: pair.and(settings.step.ray_budget),
-            rays_still: pair.map(|_| settings.step.rays_still).filter(|rays| *rays > 0),
+            ray_budget: pair.and_then(|p| p.points_per_m2).and(settings.step.ray_budget),
+            rays_still: pair
+                .and_then(|p| p.points_per_m2)
+                .map(|_| settings.step.rays_still)
+                .filter(|rays| *rays > 0),
             rays_per_pixel: match self.method {
                 Method::Rtao { rays } => Some(rays),
                 _ => None,
@@ -384,7 +387,7 @@ impl Line {
             kbit_per_s: pair.map(|p| kbit_per_s(&p.step_bytes, p.hz, stage.seconds)),
             snapshot_bytes: pair.map(|p| p.snapshot_bytes),
             cut_bytes: pair.map(Pair::cut_bytes),
-            points: pair.map(Pair::points),
+            points: pair.map(|p| p.points),
             rays: self.rays + pair.map_or(0, |p| p.rays),
             steps: pair.map(|p| p.steps),
             step_bytes: pair.map(|p| p.step_bytes.clone()).unwrap_or_default(),

@@ -46,7 +46,7 @@ pub(crate) fn run(args: &EvalArgs) -> Result<()> {
         return verbs::run(verb);
     }
     let plan = Plan::new(&args.scenes, &args.options)?;
-    let results = run::evaluate(&plan, args)?;
+    let (results, _lock) = run::evaluate(&plan, args)?;
     say!("{}", table::text(&results));
     write(&results, &args.out)?;
     if args.smoke {

@@ -127,6 +127,8 @@ pub(super) struct Pair {
     /// Absent for a method that has none.
     pub(super) points_per_m2: Option<f32>,
     pub(super) hz: f64,
+    /// At the start.
+    pub(super) points: u64,
     pub(super) snapshot_bytes: u64,
     /// Bytes of each step's update.
     pub(super) step_bytes: Vec<u32>,
@@ -174,11 +176,13 @@ impl Pair {
             bytes.extend(recorder.frame(0, &snapshot.bytes)?);
             recording = Some(Recording { recorder, bytes, duration_us });
         }
-        let rays = server.points() * u64::from(stage.settings.point_rays);
+        let points = server.points();
+        let rays = points * u64::from(stage.settings.point_rays);
         Ok(Pair {
             client,
             points_per_m2,
             hz,
+            points,
             snapshot_bytes: snapshot.bytes.len() as u64,
             step_bytes: Vec::new(),
             rays,
@@ -232,10 +236,6 @@ impl Pair {
             self.client.receive(packet).context("the client refused the server's frame")?;
         }
         Ok(StepAt { changed: report.packet.is_some(), backlog: report.counts.backlog })
-    }
-
-    pub(super) fn points(&self) -> u64 {
-        self.server.points()
     }
 
     pub(super) fn cut_bytes(&self) -> u64 {

@@ -41,7 +41,8 @@ struct Run<'a> {
     work: Work,
 }
 
-pub(super) fn evaluate(plan: &Plan, args: &EvalArgs) -> Result<Results> {
+/// The results, and what keeps other evaluations out of the folder until they are written.
+pub(super) fn evaluate(plan: &Plan, args: &EvalArgs) -> Result<(Results, Option<File>)> {
     let judge = Judge::new(&args.judge)?;
     if let Some(record) = &args.record
         && !record.extension().is_some_and(|e| e.eq_ignore_ascii_case("dapple"))
@@ -89,7 +90,7 @@ pub(super) fn evaluate(plan: &Plan, args: &EvalArgs) -> Result<Results> {
         let jobs = if run.reused == 1 { "job" } else { "jobs" };
         say!("{} {jobs} done before, not run again (--fresh runs all)", run.reused);
     }
-    Ok(results)
+    Ok((results, run.lock))
 }
 
 /// What readers of the figures should know: of all, then of each case.
@@ -310,6 +311,8 @@ impl Run<'_> {
             "points": [settings.point_rays, u32::from(settings.threshold), settings.step.rays_still],
             "ray_budget": settings.step.ray_budget,
             "hdr_flip": settings.hdr_flip,
+            // Says how long flicker is watched.
+            "slowest_hz": settings.slowest_hz(),
             "judge": [json!(self.judge.weights), json!(self.judge.pixels_per_degree)],
         }));
         let what = format!("{name}: {}", job.name());

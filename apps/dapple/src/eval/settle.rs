@@ -16,6 +16,8 @@ use crate::picture::Shown;
 const WATCHED_S: f64 = 1.0;
 /// Most server steps that a scene standing at its start gets before the jump, so that nothing of the path is left.
 const MAX_STEPS_BEFORE: u32 = 256;
+/// So many steps without a change are taken for the end: some servers look elsewhere in each.
+const QUIET_STEPS: u32 = 8;
 /// The light has settled where this part of the squared difference to what it becomes is left.
 const SETTLED: f64 = 0.05;
 
@@ -29,9 +31,11 @@ pub(super) fn settle(
 ) -> Result<Vec<Settling>> {
     let moved_s = (0.5 * stage.whole_s * CLIENT_HZ).floor() / CLIENT_HZ;
     let frame = stage.middle(moved_s, cache)?;
+    let mut quiet = 0;
     for _ in 0..MAX_STEPS_BEFORE {
         let step = pair.step_at(0.0, stage)?;
-        if !step.changed && step.backlog == 0 {
+        quiet = if step.changed || step.backlog > 0 { 0 } else { quiet + 1 };
+        if quiet == QUIET_STEPS {
             break;
         }
     }

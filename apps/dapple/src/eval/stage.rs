@@ -151,10 +151,14 @@ impl<'a> Stage<'a> {
         Ok(frame)
     }
 
+    /// Of the slowest server.
+    fn client_frames_a_step(&self) -> u32 {
+        (CLIENT_HZ / self.settings.slowest_hz()).ceil() as u32
+    }
+
     /// Client frames after a picture in which flicker is watched, the last one not after `until_s`.
     fn watched(&self, time_s: f64, until_s: f64) -> Vec<f64> {
-        let slowest_hz = self.settings.hz.iter().copied().fold(CLIENT_HZ, f64::min);
-        let step = ((CLIENT_HZ / slowest_hz).ceil() as u32).min(MAX_WATCHED);
+        let step = self.client_frames_a_step().min(MAX_WATCHED);
         let left = ((until_s - time_s) * CLIENT_HZ + 1e-6) as u32;
         (1..=step.min(left)).map(|k| time_s + f64::from(k) / CLIENT_HZ).collect()
     }
@@ -178,7 +182,11 @@ impl<'a> Stage<'a> {
         };
         let traced = cache.get(&request, || self.tracer_at(&drawn), progress)?;
         let truth = Shown::new(&drawn, Some(&traced.visibility))?;
-        let still = still_map(scene, &drawn, watched_s, &self.moving, self.radius_m);
+        // What the client shows first may be a step old: what moved since then is no flicker when it arrives.
+        let before =
+            (1..=self.client_frames_a_step().min(MAX_WATCHED)).map(|k| time_s - f64::from(k) / CLIENT_HZ);
+        let times_s: Vec<f64> = before.filter(|t| *t >= 0.0).chain(watched_s.iter().copied()).collect();
+        let still = still_map(scene, &drawn, &times_s, &self.moving, self.radius_m);
         Ok(Frame { time_s, drawn, truth, noise_mse: traced.noise_mse, watched_s: watched_s.to_vec(), still })
     }
 

@@ -10,7 +10,7 @@ use dapple_scene::{Aabb, Scene};
 /// place within reach of something that moves.
 pub(super) type StillMap = Vec<[f32; 2]>;
 
-/// Still from the picture's time on, at all of `times_s`.
+/// Still at the picture's time and at all of `times_s`.
 pub(super) fn still_map(
     scene: &Scene,
     drawn: &Drawn,
@@ -35,7 +35,7 @@ pub(super) fn still_map(
         .collect()
 }
 
-/// Boxes around what moves from the picture on, as wide as rays reach.
+/// Boxes around what moves, at all times together, as wide as rays reach.
 fn reach(scene: &Scene, drawn: &Drawn, times_s: &[f64], moving: &[bool], radius_m: f32) -> Vec<Aabb> {
     let movers: Vec<usize> =
         (0..scene.instances.len()).filter(|&i| moving[i] && scene.instances[i].casts).collect();

@@ -81,6 +81,9 @@ impl Settings {
         if !(1..=8).contains(&self.supersample) {
             bail!("--supersample is {}, must be 1 to 8", self.supersample);
         }
+        if self.threshold > 127 {
+            bail!("--threshold is {}, must be 0 to 127", self.threshold);
+        }
         if !(1..=65536).contains(&self.reference_rays) {
             bail!("--reference-rays is {}, must be 1 to 65536", self.reference_rays);
         }
@@ -125,6 +128,11 @@ impl Settings {
             }
         }
         Ok(())
+    }
+
+    /// The slowest of the rates, or the client's own where all are faster.
+    pub(in crate::eval) fn slowest_hz(&self) -> f64 {
+        self.hz.iter().copied().fold(CLIENT_HZ, f64::min)
     }
 
     /// Rays a sample so that a pixel gets `rays_per_pixel`.

@@ -35,7 +35,7 @@ const WIDEST: f32 = 1.483_53;
 /// Patches keep their texels for so long while they are not seen, seconds.
 const KEPT_S: f64 = 2.0;
 /// Longest side of the picture that says what is seen, pixels.
-const MOST_PIXELS: u32 = 8192;
+const MOST_PIXELS: u32 = 2048;
 /// Samples of it along each axis of a pixel.
 const SAMPLES: u32 = 2;
 /// Nothing counts as nearer, metres.
