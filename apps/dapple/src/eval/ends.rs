@@ -129,6 +129,7 @@ impl AnyServer {
     }
 
     /// What a client gets on joining at the start.
+    #[cfg_attr(not(feature = "sas"), expect(unused_variables, reason = "only one of the rivals has to look"))]
     pub(super) fn join(&mut self, stage: &Stage<'_>) -> Result<Packet> {
         match self {
             AnyServer::Own(server) => match server.join()? {
