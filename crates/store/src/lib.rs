@@ -5,4 +5,5 @@
 
 pub mod cells;
 pub mod charts;
+mod octahedral;
 pub mod points;

@@ -1,6 +1,7 @@
 //! Sends the values of a recording once more, at several precisions: bits, errors and times.
 //!
-//! `dapple record --threshold 0 … -o true.dapple`, then `cargo run --release -p dapple-stream --example replay true.dapple`.
+//! `dapple record --threshold 0 … -o true.dapple`, then `cargo run --release -p dapple-stream --features
+//! publish --example replay true.dapple`.
 //! The recording should be exact, for its values are what errors are measured against.
 
 use std::time::{Duration, Instant};

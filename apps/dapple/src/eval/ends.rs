@@ -5,7 +5,7 @@ use std::sync::Arc;
 use anyhow::{Context, Result, bail};
 use dapple_client::paper::PaperClient;
 use dapple_client::{Client, Drawn, Reconstruction};
-use dapple_render::psao::Kernel;
+use dapple_render::psao::{Hat, Kernel};
 use dapple_scene::{PosedCamera, Scene};
 use dapple_server::Server;
 use dapple_server::paper::{Look, PaperConfig, PaperServer};
@@ -211,17 +211,21 @@ impl AnyClient {
         Ok(())
     }
 
-    /// Visibility of each sample. The paper's client has no atlas and takes its kernel instead.
-    pub(super) fn visibility(&self, drawn: &Drawn, reconstruction: &Reconstruction) -> Vec<f32> {
-        match (self, reconstruction) {
-            (AnyClient::Own(client), _) => client.visibility(drawn, reconstruction),
-            (AnyClient::Paper(client), Reconstruction::Direct(kernel)) => client.visibility(drawn, kernel),
-            (AnyClient::Paper(client), Reconstruction::Atlas) => {
-                client.visibility(drawn, &Kernel::Hat(Default::default()))
+    /// Visibility of each sample, as `method` looks it up.
+    pub(super) fn visibility(&self, drawn: &Drawn, method: Method) -> Result<Vec<f32>> {
+        let hat = |radius| Kernel::Hat(Hat { radius, ..Hat::default() });
+        Ok(match (self, method) {
+            (AnyClient::Own(client), Method::Psao) => client.visibility(drawn, &Reconstruction::Atlas),
+            (AnyClient::Own(client), Method::PsaoMls) => client.visibility(drawn, &Kernel::default().into()),
+            (AnyClient::Own(client), Method::PsaoHat { radius }) => {
+                client.visibility(drawn, &hat(radius).into())
             }
+            (AnyClient::Paper(client), Method::PsaoPaper) => client.visibility(drawn, &hat(1.0)),
+            (AnyClient::Paper(client), Method::PsaoPaperMls) => client.visibility(drawn, &Kernel::default()),
             #[cfg(feature = "sas")]
-            (AnyClient::Sas(client), _) => client.visibility(drawn),
-        }
+            (AnyClient::Sas(client), Method::Sas { .. }) => client.visibility(drawn),
+            _ => bail!("{method} does not belong to this client"),
+        })
     }
 
     /// Makes what is made once a session.

@@ -3,10 +3,9 @@
 use std::time::Instant;
 
 use anyhow::Result;
-use dapple_client::{Drawn, Reconstruction};
+use dapple_client::Drawn;
 use dapple_metrics::Flicker;
 use dapple_render::compose::resolve_plane;
-use dapple_render::psao::{Hat, Kernel};
 use dapple_trace::rtao::{RtaoParams, trace_visibility};
 use serde::{Deserialize, Serialize};
 
@@ -195,26 +194,13 @@ impl Job {
         if let Some(pair) = &mut pair {
             pair.advance(stage.seconds, stage)?;
             recording = pair.take_recording();
-            let looks: Vec<Reconstruction> = lines.iter().filter_map(|l| reconstruction(l.method)).collect();
-            settlings = settle(stage, pair, &looks, desk.cache)?.into_iter().map(Some).collect();
+            settlings = settle(stage, pair, &self.methods(), desk.cache)?.into_iter().map(Some).collect();
         }
         let rows = lines.into_iter().zip(settlings);
         let rows =
             rows.map(|(line, settling)| line.finish(stage, pair.as_ref(), settling, desk.truth)).collect();
         let hash = recording.as_ref().map(|bytes| blake3::hash(bytes).to_hex().to_string());
         Ok((Outcome { rows, recording: hash }, recording))
-    }
-}
-
-fn reconstruction(method: Method) -> Option<Reconstruction> {
-    match method {
-        Method::Psao => Some(Reconstruction::Atlas),
-        Method::PsaoMls | Method::PsaoPaperMls => Some(Kernel::default().into()),
-        Method::PsaoPaper => Some(Kernel::Hat(Hat::default()).into()),
-        Method::PsaoHat { radius } => Some(Kernel::Hat(Hat { radius, ..Hat::default() }).into()),
-        // Its client has one way only, which the name of another stands for.
-        Method::Sas { .. } => Some(Reconstruction::Atlas),
-        Method::Rtao { .. } | Method::None => None,
     }
 }
 
@@ -253,11 +239,11 @@ impl Line {
         pair: Option<&Pair>,
         drawn: &Drawn,
         now_s: f64,
-    ) -> Option<Vec<f32>> {
+    ) -> Result<Option<Vec<f32>>> {
         let start = Instant::now();
-        let visibility = match (self.method, pair, reconstruction(self.method)) {
-            (_, Some(pair), Some(reconstruction)) => Some(pair.client.visibility(drawn, &reconstruction)),
-            (Method::Rtao { rays }, _, _) => {
+        let visibility = match (self.method, pair) {
+            (method, Some(pair)) => Some(pair.client.visibility(drawn, method)?),
+            (Method::Rtao { rays }, _) => {
                 let rays = stage.settings.rays_per_sample(rays);
                 let (indices, sites) = sites(stage.scene(), drawn);
                 self.rays_of_look = sites.len() as u64 * u64::from(rays);
@@ -277,7 +263,7 @@ impl Line {
         };
         self.reconstruct_seconds += start.elapsed().as_secs_f64();
         self.looks += 1;
-        visibility
+        Ok(visibility)
     }
 
     fn compare(
@@ -288,7 +274,7 @@ impl Line {
         number: usize,
         desk: &Desk<'_>,
     ) -> Result<()> {
-        let visibility = self.look(stage, pair, &frame.drawn, frame.time_s);
+        let visibility = self.look(stage, pair, &frame.drawn, frame.time_s)?;
         self.rays += self.rays_of_look;
         let shown = Shown::new(&frame.drawn, visibility.as_deref())?;
         let compared = Compared::new(&frame.truth, &shown, desk.judge, stage.settings.hdr_flip)?;
@@ -324,7 +310,8 @@ impl Line {
         changed: bool,
     ) -> Result<()> {
         let (drawn, before) = (&frame.drawn, std::mem::take(&mut self.visibility));
-        let now = match changed.then(|| self.look(stage, pair, drawn, now_s)).flatten() {
+        let samples = if changed { self.look(stage, pair, drawn, now_s)? } else { None };
+        let now = match samples {
             Some(samples) => resolve_plane(&drawn.gbuffer, &samples, 1.0)?.values.values,
             None => before.clone(),
         };

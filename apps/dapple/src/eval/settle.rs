@@ -2,7 +2,6 @@
 //! stands still there.
 
 use anyhow::Result;
-use dapple_client::Reconstruction;
 use dapple_metrics::psnr_masked;
 
 use super::pair::Pair;
@@ -10,6 +9,7 @@ use super::plan::CLIENT_HZ;
 use super::results::Settling;
 use super::stage::{Frame, Stage};
 use super::truth::Cache;
+use crate::args::Method;
 use crate::picture::Shown;
 
 /// Longest time after the move that is watched, seconds; at least three server steps.
@@ -21,12 +21,12 @@ const QUIET_STEPS: u32 = 8;
 /// The light has settled where this part of the squared difference to what it becomes is left.
 const SETTLED: f64 = 0.05;
 
-/// For each way to look the light up: what is shown at client frames after the move. The server's next step comes a whole period after
+/// For each method: what is shown at client frames after the move. The server's next step comes a whole period after
 /// the move, the worst case. The client draws the new scene at once, with what light it has.
 pub(super) fn settle(
     stage: &Stage<'_>,
     pair: &mut Pair,
-    looks: &[Reconstruction],
+    methods: &[Method],
     cache: &Cache,
 ) -> Result<Vec<Settling>> {
     let moved_s = (0.5 * stage.whole_s * CLIENT_HZ).floor() / CLIENT_HZ;
@@ -41,7 +41,7 @@ pub(super) fn settle(
     }
     let watched_s = WATCHED_S.max(3.0 / pair.hz);
     let frames = (watched_s * CLIENT_HZ).ceil() as u32;
-    let mut shown: Vec<Vec<Look>> = looks.iter().map(|_| Vec::new()).collect();
+    let mut shown: Vec<Vec<Look>> = methods.iter().map(|_| Vec::new()).collect();
     let mut after_s = Vec::new();
     let (mut steps, mut backlog) = (0, 0);
     for number in 0..=frames {
@@ -54,9 +54,9 @@ pub(super) fn settle(
             backlog = step.backlog;
         }
         after_s.push(now_s);
-        for (look, shown) in looks.iter().zip(&mut shown) {
+        for (method, shown) in methods.iter().zip(&mut shown) {
             if changed {
-                shown.push(Look::new(pair, look, &frame, number as usize)?);
+                shown.push(Look::new(pair, *method, &frame, number as usize)?);
             }
         }
     }
@@ -72,8 +72,8 @@ struct Look {
 }
 
 impl Look {
-    fn new(pair: &Pair, look: &Reconstruction, frame: &Frame, since: usize) -> Result<Look> {
-        let samples = pair.client.visibility(&frame.drawn, look);
+    fn new(pair: &Pair, method: Method, frame: &Frame, since: usize) -> Result<Look> {
+        let samples = pair.client.visibility(&frame.drawn, method)?;
         let visibility = Shown::new(&frame.drawn, Some(&samples))?.into_visibility();
         let psnr_db = match frame.truth.covered_pixels {
             0 => f64::INFINITY,

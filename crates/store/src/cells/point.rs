@@ -2,6 +2,8 @@
 
 use glam::{Vec2, Vec3};
 
+use crate::octahedral::{flatten, unflatten};
+
 /// Steps of a normal's component to either side of zero, so that axes are exact.
 const NORMAL_STEPS: f32 = 7.0;
 
@@ -55,11 +57,7 @@ impl PackedPoint {
 
 /// A unit normal, octahedrally mapped, 4 bits a component in −7 … 7. At most 17.2° off. A zero vector packs as +Z.
 pub fn pack_normal(normal: Vec3) -> u8 {
-    let sum = normal.x.abs() + normal.y.abs() + normal.z.abs();
-    let mut p = if sum > 0.0 { Vec2::new(normal.x, normal.y) / sum } else { Vec2::ZERO };
-    if normal.z < 0.0 {
-        p = fold(p);
-    }
+    let p = flatten(normal);
     let nibble = |v: f32| (v * NORMAL_STEPS + NORMAL_STEPS).round().clamp(0.0, 2.0 * NORMAL_STEPS) as u8;
     nibble(p.x) << 4 | nibble(p.y)
 }
@@ -67,16 +65,7 @@ pub fn pack_normal(normal: Vec3) -> u8 {
 /// The unit normal of [`pack_normal`]'s bits; every pattern gives one.
 pub fn unpack_normal(bits: u8) -> Vec3 {
     let component = |nibble: u8| f32::from(nibble.min(14)) / NORMAL_STEPS - 1.0;
-    let p = Vec2::new(component(bits >> 4), component(bits & 15));
-    let z = 1.0 - p.x.abs() - p.y.abs();
-    let xy = if z < 0.0 { fold(p) } else { p };
-    Vec3::new(xy.x, xy.y, z).normalize()
-}
-
-/// Mirrors a point of the outer triangles over the square's diagonal, and back.
-fn fold(p: Vec2) -> Vec2 {
-    let sign = |v: f32| if v < 0.0 { -1.0 } else { 1.0 };
-    Vec2::new((1.0 - p.y.abs()) * sign(p.x), (1.0 - p.x.abs()) * sign(p.y))
+    unflatten(Vec2::new(component(bits >> 4), component(bits & 15)))
 }
 
 #[cfg(test)]

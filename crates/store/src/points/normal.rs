@@ -2,6 +2,8 @@
 
 use glam::{Vec2, Vec3};
 
+use crate::octahedral::{flatten, unflatten};
+
 /// A unit vector, octahedrally mapped, 8 bits a component: at most 1.0° off.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PackedNormal(pub [u8; 2]);
@@ -9,14 +11,7 @@ pub struct PackedNormal(pub [u8; 2]);
 impl PackedNormal {
     /// Packs a unit vector. A zero vector packs as +Z.
     pub fn pack(normal: Vec3) -> PackedNormal {
-        let sum = normal.x.abs() + normal.y.abs() + normal.z.abs();
-        if sum.is_nan() || sum <= 0.0 {
-            return PackedNormal::pack(Vec3::Z);
-        }
-        let mut p = Vec2::new(normal.x, normal.y) / sum;
-        if normal.z < 0.0 {
-            p = fold(p);
-        }
+        let p = flatten(normal);
         let byte = |v: f32| ((v * 127.0).round() as i32 + 127).clamp(0, 254) as u8;
         PackedNormal([byte(p.x), byte(p.y)])
     }
@@ -24,17 +19,8 @@ impl PackedNormal {
     /// The unit vector. Every bit pattern gives one.
     pub fn unpack(self) -> Vec3 {
         let component = |b: u8| (f32::from(b.min(254)) - 127.0) / 127.0;
-        let p = Vec2::new(component(self.0[0]), component(self.0[1]));
-        let z = 1.0 - p.x.abs() - p.y.abs();
-        let xy = if z < 0.0 { fold(p) } else { p };
-        Vec3::new(xy.x, xy.y, z).normalize()
+        unflatten(Vec2::new(component(self.0[0]), component(self.0[1])))
     }
-}
-
-/// Mirrors a point of the outer triangles over the square's diagonal, and back.
-fn fold(p: Vec2) -> Vec2 {
-    let sign = |v: f32| if v < 0.0 { -1.0 } else { 1.0 };
-    Vec2::new((1.0 - p.y.abs()) * sign(p.x), (1.0 - p.x.abs()) * sign(p.y))
 }
 
 #[cfg(test)]

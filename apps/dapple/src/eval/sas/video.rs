@@ -25,7 +25,7 @@ impl Sender {
     pub(super) fn new(width: u32, height: u32, hz: f64) -> Result<Sender> {
         let config = EncoderConfig::new()
             .usage_type(UsageType::CameraVideoRealTime)
-            .rate_control_mode(RateControlMode::Quality)
+            .rate_control_mode(RateControlMode::Off)
             .qp(QpRange::new(QP, QP))
             .max_frame_rate(FrameRate::from_hz(hz as f32))
             .intra_frame_period(IntraFramePeriod::from_num_frames(0))

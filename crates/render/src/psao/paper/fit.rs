@@ -1,11 +1,12 @@
 //! Moving least squares over the points of the paper's cells: the literal format with the kernel of `psao-mls`.
 
 use dapple_store::cells::CellTable;
-use dapple_store::charts::{Fit, MovingLeastSquares, Weighed};
+use dapple_store::charts::{MovingLeastSquares, Weighed};
 use glam::Vec3;
 
 use super::InGrid;
 use crate::gbuffer::LocalSurface;
+use crate::psao::mls::fitted;
 
 /// A point of a cell, unpacked.
 #[derive(Clone, Copy, Debug)]
@@ -83,23 +84,15 @@ pub(super) fn visibility(
     let n = fragment.normal_local;
     let (tangent, bitangent) = n.any_orthonormal_pair();
     near.weighed.clear();
-    let (mut least, mut greatest) = (f32::INFINITY, f32::NEG_INFINITY);
     for p in &near.points {
         let d = (p.position_local - fragment.position_local) / r;
         let weight = kernel.weight(d, n, p.normal_local);
         if weight > 0.0 {
-            (least, greatest) = (least.min(p.visibility), greatest.max(p.visibility));
             near.weighed
                 .push((Weighed { weight, tangent: [d.dot(tangent), d.dot(bitangent)] }, p.visibility));
         }
     }
-    let value = match Fit::new(near.weighed.iter().map(|&(p, _)| p)) {
-        // Kept within the range of the values that were fitted: one-sided neighbourhoods must not overshoot.
-        Some(fit) => {
-            let value: f32 = near.weighed.iter().map(|&(p, value)| fit.coefficient(p) * value).sum();
-            value.clamp(least, greatest)
-        }
-        None => near.nearest(table, &place, fragment).unwrap_or(255.0),
-    };
+    let value =
+        fitted(&near.weighed).unwrap_or_else(|| near.nearest(table, &place, fragment).unwrap_or(255.0));
     (value / 255.0).clamp(0.0, 1.0)
 }
