@@ -5,7 +5,7 @@ mod accessor;
 mod convert;
 mod document;
 mod edit;
-mod fill;
+pub(crate) mod fill;
 mod fit;
 mod gather;
 mod given;

@@ -1,5 +1,6 @@
 //! The sending end: which patches may be seen, how many texels each gets, their visibility, the picture.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -8,12 +9,14 @@ use dapple_render::gbuffer::rasterize;
 use dapple_scene::glam::{Mat3, Vec3};
 use dapple_scene::{Aabb, Pose, PosedCamera, Projection, Scene};
 use dapple_trace::Tracer;
+use dapple_trace::inside::{Solids, find_inside};
 use dapple_trace::rtao::{RtaoParams, Site, trace_visibility};
 
 use super::atlas::{Atlas, Block, LEAST_SIDE, MOST_SIDE};
 use super::patches::Patch;
 use super::video::Sender;
 use super::{Blocks, Numbers, SasFrame, SasStep};
+use crate::bake::fill::Planes;
 
 /// What a server depends on beside its scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,6 +37,8 @@ const MARGIN: f32 = 0.349_066;
 const WIDEST: f32 = 1.483_53;
 /// Patches keep their texels for so long while they are not seen, seconds.
 const KEPT_S: f64 = 2.0;
+/// Texels that lie inside are filled ring by ring so far, then with coarse means.
+const FILLED_RINGS: u32 = 2;
 /// Longest side of the picture that says what is seen, pixels.
 const MOST_PIXELS: u32 = 2048;
 /// Samples of it along each axis of a pixel.
@@ -61,6 +66,7 @@ pub(in crate::eval) struct SasServer {
     params: SasParams,
     numbers: Numbers,
     tracer: Tracer,
+    solids: Solids,
     moving: Vec<bool>,
     /// Of casting movers in the step before, by instance.
     reach: Vec<Option<Aabb>>,
@@ -87,10 +93,12 @@ impl SasServer {
             bail!("sas-{}: the bias must be 1 to 1024", params.bias);
         }
         let numbers = Numbers::new(&scene);
+        let solids = Solids::new(&scene);
         let moving = scene.moving_instances();
         let reach = vec![None; scene.instances.len()];
         let mut server = SasServer {
             numbers,
+            solids,
             moving,
             reach,
             tracer,
@@ -310,13 +318,13 @@ impl SasServer {
     /// Traces texels of what is seen that are not those of the present. How many rays it took, and whether any texel changed.
     fn shade(&mut self, pose: &Pose, seen: &Seen) -> (u64, bool) {
         let mut sites = Vec::new();
-        let mut texels = Vec::new();
+        let mut blocks = Vec::new();
         for &number in seen.keys() {
             let Some(held) = self.held.get(&number).filter(|held| !held.current) else { continue };
             let (instance, patch, is_back) = self.patch(number);
             let corner = self.corner(pose, instance);
             let flip = Mat3::from(pose.instances[instance].world_from_mesh.matrix3).determinant() < 0.0;
-            let Block { x, y, width, height } = held.block;
+            let Block { width, height, .. } = held.block;
             let at = |i: u16, side: u16| (f32::from(i) + 0.5) / f32::from(side);
             for (j, i) in (0..height).flat_map(|j| (0..width).map(move |i| (j, i))) {
                 let (place, normal) = patch.surface([at(i, width), at(j, height)], &corner);
@@ -324,15 +332,26 @@ impl SasServer {
                 // Keyed by the place in the patch, so that a texel that is traced again gets the same rays.
                 let key = u64::from(number) << 16 | u64::from(j) << 8 | u64::from(i);
                 sites.push(Site { position_world: place, normal_world, key });
-                texels.push((usize::from(y + j)) * self.atlas.width as usize + usize::from(x + i));
             }
+            blocks.push(held.block);
         }
         let mut visibility = vec![1.0; sites.len()];
         trace_visibility(&self.tracer, &sites, &self.params.rays, &mut visibility);
-        let mut changed = false;
-        for (texel, visibility) in texels.into_iter().zip(visibility) {
-            let value = (255.0 * visibility).round() as u8;
-            changed |= std::mem::replace(&mut self.luma[texel], value) != value;
+        let mut inside = vec![false; sites.len()];
+        find_inside(&self.scene, &self.tracer, &self.solids, &sites, &mut inside);
+        let (mut changed, mut first) = (false, 0);
+        for block in blocks {
+            let (width, height) = (usize::from(block.width), usize::from(block.height));
+            let of = first..first + width * height;
+            first = of.end;
+            let values = without_inside(&visibility[of.clone()], &inside[of], (width, height));
+            for (row, values) in values.chunks(width).enumerate() {
+                let start = (usize::from(block.y) + row) * self.atlas.width as usize + usize::from(block.x);
+                for (texel, visibility) in self.luma[start..start + width].iter_mut().zip(values) {
+                    let value = (255.0 * visibility).round() as u8;
+                    changed |= std::mem::replace(texel, value) != value;
+                }
+            }
         }
         for number in seen.keys() {
             if let Some(held) = self.held.get_mut(number) {
@@ -341,6 +360,24 @@ impl SasServer {
         }
         (sites.len() as u64 * u64::from(self.params.rays.rays), changed)
     }
+}
+
+/// The texels of a patch, those inside of bodies by their neighbours: nobody sees them, and their darkness must not be
+/// interpolated to where somebody does. Where all are inside they stay.
+fn without_inside<'a>(
+    visibility: &'a [f32],
+    inside: &[bool],
+    (width, height): (usize, usize),
+) -> Cow<'a, [f32]> {
+    if !inside.contains(&true) || !inside.contains(&false) {
+        return Cow::Borrowed(visibility);
+    }
+    let known = inside.iter().map(|inside| !inside).collect();
+    // What is not known must not count.
+    let values = visibility.iter().zip(inside).map(|(v, inside)| if *inside { 0.0 } else { *v }).collect();
+    let mut planes = Planes { width, height, channels: vec![values], known };
+    planes.fill(FILLED_RINGS, &[1.0]);
+    Cow::Owned(planes.channels.swap_remove(0))
 }
 
 /// A camera that sees further on all sides, and how much larger its picture is.

@@ -90,3 +90,23 @@ fn assert_same_where_both(a: &BTreeMap<u32, Vec<u8>>, b: &BTreeMap<u32, Vec<u8>>
     assert!(2 * both.len() > a.len().max(b.len()), "{} of {} and {}", both.len(), a.len(), b.len());
     assert!(both.iter().all(|(a, b)| a == b));
 }
+
+/// A floor of 8 × 8 m, and a closed block of 4 × 4 m that stands in its middle, half sunk, 0.4 m high.
+const BLOCK: &str = "\
+v -4 0 -4\nv -4 0 4\nv 4 0 4\nv 4 0 -4\nf 1 2 3\nf 1 3 4\n\
+v -2 -0.5 -2\nv -2 -0.5 2\nv 2 -0.5 2\nv 2 -0.5 -2\nv -2 0.4 -2\nv -2 0.4 2\nv 2 0.4 2\nv 2 0.4 -2\n\
+f 5 8 7\nf 5 7 6\nf 9 10 11\nf 9 11 12\nf 6 7 11\nf 6 11 10\nf 8 5 9\nf 8 9 12\nf 7 8 12\nf 7 12 11\nf 5 6 10\nf 5 10 9\n";
+
+#[test]
+fn what_lies_inside_of_a_body_darkens_nothing() {
+    let scene = dapple_scene::load("block.obj", BLOCK.as_bytes(), &dapple_scene::NoFiles).unwrap();
+    let scene = Arc::new(scene);
+    let camera = PosedCamera::look_at([0.0, 8.0, 6.0].into(), [0.0; 3].into(), 0.9);
+    let mut server = server(&scene, &camera, 16);
+    server.step(0.0, &camera).unwrap();
+    let texels = server.texels_seen();
+    let floor = texels.values().max_by_key(|texels| texels.len()).unwrap();
+    assert_eq!(floor.len(), 64, "a texel a metre: the block hides sixteen");
+    // A low wall half a metre away leaves most of the sky open; under the block there is none.
+    assert!(floor.iter().all(|v| *v >= 150), "{floor:?}");
+}
