@@ -10,11 +10,16 @@ impl Scene {
     /// this scene.
     ///
     /// For rigid and morphed instances it is rest space ([`crate::Instance::rest_from_mesh`]), whatever the pose; for
-    /// skinned ones, whose vertices are posed in the world, it is the instance's node without its scale.
+    /// skinned ones, whose vertices are posed in the world, it is the node that all joints hang from, most often the root joint,
+    /// without its scale: it goes where the skeleton goes, whatever node the mesh was put at (glTF 2.0, 3.7.3.3, ignores that one).
+    /// The world, if the joints have no node in common.
     pub fn local_from_posed(&self, pose: &Pose, instance: usize) -> Affine3A {
         let placed = &self.instances[instance];
         if self.is_skinned(instance) {
-            without_scale(&pose.world_from_node[placed.node as usize]).inverse()
+            let root = placed.skin.and_then(|skin| self.common_node(&self.skins[skin as usize].joints));
+            root.map_or(Affine3A::IDENTITY, |root| {
+                without_scale(&pose.world_from_node[root as usize]).inverse()
+            })
         } else {
             Affine3A::from_mat3_translation(placed.rest_from_mesh, Vec3::ZERO)
         }
@@ -26,6 +31,20 @@ impl Scene {
         self.is_skinned(instance) || !self.meshes[mesh].morph_targets.is_empty()
     }
 
+    /// The node nearest to them that all of these are or hang from.
+    fn common_node(&self, nodes: &[u32]) -> Option<u32> {
+        let (&first, others) = nodes.split_first()?;
+        others.iter().try_fold(first, |mut common, &node| {
+            let mut node = node;
+            // Parents come before their children.
+            while common != node {
+                let deeper = if common > node { &mut common } else { &mut node };
+                *deeper = self.nodes[*deeper as usize].parent?;
+            }
+            Some(common)
+        })
+    }
+
     fn is_skinned(&self, instance: usize) -> bool {
         let placed = &self.instances[instance];
         placed.skin.is_some() && !self.meshes[placed.mesh as usize].influences.is_empty()
@@ -35,7 +54,7 @@ impl Scene {
 #[cfg(all(test, feature = "builtin"))]
 #[allow(clippy::unwrap_used, reason = "tests may panic")]
 mod tests {
-    use crate::{NoFiles, builtin, load};
+    use crate::{Aabb, NoFiles, builtin, load};
     use glam::Vec3;
 
     #[test]
@@ -43,6 +62,7 @@ mod tests {
         let scene = load("lab.glb", &builtin::glb("lab", 0.1).unwrap(), &NoFiles).unwrap();
         let poses = [scene.pose(0.0), scene.pose(1.7)];
         let mut bent = 0;
+        let size = |vertices: &[Vec3]| Aabb::from_points(vertices.iter().copied()).diagonal();
         for instance in 0..scene.instances.len() {
             let local = poses.each_ref().map(|pose| {
                 let map = scene.local_from_posed(pose, instance);
@@ -51,6 +71,9 @@ mod tests {
             });
             if scene.is_deformable(instance) {
                 bent += u32::from(local[0] != local[1]);
+                // A walker stays where it is while it goes some metres.
+                let both = [&local[0][..], &local[1]].concat();
+                assert!(size(&both) < 1.5 * size(&local[0]), "instance {instance}: {} m", size(&both));
             } else {
                 assert_eq!(local[0], local[1], "instance {instance}");
             }
