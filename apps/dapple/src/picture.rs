@@ -116,6 +116,9 @@ impl Shown {
 pub(crate) struct Compared {
     /// PSNR of visibility over the pixels that show geometry; `None` if none does, infinite if equal.
     pub(crate) visibility_psnr_db: Option<f64>,
+    /// The same over some of these pixels, and how many they are.
+    pub(crate) some_psnr_db: Option<f64>,
+    pub(crate) some_pixels: usize,
     /// PSNR of the 8-bit picture; infinite if equal.
     pub(crate) psnr_db: f64,
     pub(crate) ssim: f64,
@@ -133,13 +136,21 @@ pub(crate) struct Maps {
 }
 
 impl Compared {
-    pub(crate) fn new(truth: &Shown, test: &Shown, judge: &Judge, hdr_flip: bool) -> Result<Compared> {
+    /// `some` says which pixels are looked at apart.
+    pub(crate) fn new(
+        truth: &Shown,
+        test: &Shown,
+        judge: &Judge,
+        hdr_flip: bool,
+        some: impl Fn(usize) -> bool,
+    ) -> Result<Compared> {
         let (width, height) = (truth.width, truth.height);
         let (truth_v, test_v) = (&truth.visibility.values, &test.visibility.values);
-        let visibility_psnr_db = match truth.covered_pixels {
-            0 => None,
-            _ => Some(psnr_masked(&truth_v.values, &test_v.values, &truth.covered, 1.0)?),
+        let over = |mask: &[bool]| match mask.contains(&true) {
+            true => psnr_masked(&truth_v.values, &test_v.values, mask, 1.0).map(Some),
+            false => Ok(None),
         };
+        let some: Vec<bool> = truth.covered.iter().enumerate().map(|(i, c)| *c && some(i)).collect();
         let [truth_rgb, test_rgb] = [&truth.beauty, &test.beauty].map(|p| p.as_flattened());
         let unit = |bytes: &[u8]| bytes.iter().map(|&b| f32::from(b) / 255.0).collect::<Vec<f32>>();
         let ppd = judge.pixels_per_degree;
@@ -156,7 +167,9 @@ impl Compared {
         };
         let lpips = judge.lpips.as_ref().map(|lpips| lpips.distance(width, height, truth_rgb, test_rgb));
         Ok(Compared {
-            visibility_psnr_db,
+            visibility_psnr_db: over(&truth.covered)?,
+            some_psnr_db: over(&some)?,
+            some_pixels: some.iter().filter(|some| **some).count(),
             psnr_db: psnr(&unit(truth_rgb), &unit(test_rgb), 1.0)?,
             ssim: ssim(width, height, &luma(&truth.beauty), &luma(&test.beauty))?,
             flip: flip.mean,

@@ -51,12 +51,17 @@ const fn cost(key: &'static str, title: &'static str, unit: &'static str, digits
 pub(super) const VISIBILITY: &str = "visibility_psnr_db";
 
 /// All columns after those that name a row: first what most look for.
-pub(super) const COLUMNS: [Column; 16] = [
+pub(super) const COLUMNS: [Column; 17] = [
     Column {
         explanation: "PSNR of visibility against the truth over all pixels that show geometry; the mean squared error is \
             pooled over the pictures",
         get: visibility,
         ..quality(VISIBILITY, "visibility", "dB", 2)
+    },
+    Column {
+        explanation: "the same over the pixels that move or have something within the radius that does",
+        get: |row| row.frames.iter().any(|frame| frame.moving_pixels > 0).then_some(row.moving_psnr_db),
+        ..quality("moving_psnr_db", "near movers", "dB", 2)
     },
     Column {
         explanation: "bits of all updates over the path, headers included, snapshot not; 1 kbit = 1000 bits",

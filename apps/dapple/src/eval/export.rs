@@ -8,7 +8,7 @@ use super::results::{Figure, FrameRow, Results};
 pub(super) fn rows_csv(results: &Results) -> Result<Vec<u8>> {
     let mut csv = csv::Writer::from_writer(Vec::new());
     let figures =
-        ["visibility_psnr_db", "psnr_db", "ssim", "flip", "hdr_flip", "lpips", "flicker", "kbit_per_s"];
+        ["visibility_psnr_db", "moving_psnr_db", "psnr_db", "ssim", "flip", "hdr_flip", "lpips", "flicker", "kbit_per_s"];
     let mut titles: Vec<String> =
         ["case", "scene", "path", "method", "points_per_m2", "hz", "rays_per_pixel"]
             .map(str::to_owned)
@@ -28,6 +28,7 @@ pub(super) fn rows_csv(results: &Results) -> Result<Vec<u8>> {
             line.push(text(row.params.rays_per_pixel));
             for figure in [
                 Some(row.visibility_psnr_db),
+                Some(row.moving_psnr_db),
                 Some(row.psnr_db),
                 Some(row.ssim),
                 Some(row.flip),
@@ -62,6 +63,7 @@ pub(super) fn frames_csv(results: &Results) -> Result<Vec<u8>> {
         "hz",
         "time_s",
         "visibility_psnr_db",
+        "moving_psnr_db",
         "psnr_db",
         "ssim",
         "flip",
@@ -84,6 +86,7 @@ pub(super) fn frames_csv(results: &Results) -> Result<Vec<u8>> {
                     &text(row.params.hz),
                     &time_s.to_string(),
                     &text(frame.visibility_psnr_db),
+                    &text(frame.moving_psnr_db),
                     &text(frame.psnr_db),
                     &ssim.to_string(),
                     &flip.to_string(),

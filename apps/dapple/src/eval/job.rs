@@ -277,13 +277,18 @@ impl Line {
         let visibility = self.look(stage, pair, &frame.drawn, frame.time_s)?;
         self.rays += self.rays_of_look;
         let shown = Shown::new(&frame.drawn, visibility.as_deref())?;
-        let compared = Compared::new(&frame.truth, &shown, desk.judge, stage.settings.hdr_flip)?;
+        // Everything else is within reach of something that moves.
+        let touched = |pixel: usize| frame.still[pixel][0].is_nan();
+        let compared =
+            Compared::new(&frame.truth, &shown, desk.judge, stage.settings.hdr_flip, touched)?;
         let stem = format!("{}/{number:03}-{}", desk.folder, self.method);
         let files = shown.write(desk.out, &stem)?;
         let maps = compared.write(desk.out, &stem)?;
         self.frames.push(FrameRow {
             time_s: frame.time_s,
             visibility_psnr_db: compared.visibility_psnr_db.filter(|db| db.is_finite()),
+            moving_psnr_db: compared.some_psnr_db.filter(|db| db.is_finite()),
+            moving_pixels: compared.some_pixels as u64,
             psnr_db: Some(compared.psnr_db).filter(|db| db.is_finite()),
             ssim: compared.ssim,
             flip: compared.flip,
@@ -342,6 +347,8 @@ impl Line {
             .zip(&covered)
             .map(|(f, &weight)| FrameError::new(f.visibility_psnr_db, weight))
             .collect();
+        let moving = |f: &FrameRow| FrameError::new(f.moving_psnr_db, f.moving_pixels as f64);
+        let moving: Vec<FrameError> = self.frames.iter().map(moving).collect();
         let picture: Vec<FrameError> = self.frames.iter().map(|f| FrameError::new(f.psnr_db, 1.0)).collect();
         let params = Params {
             points_per_m2: pair.and_then(|p| p.points_per_m2),
@@ -365,6 +372,7 @@ impl Line {
             params,
             compared_pixels: covered.iter().sum::<f64>() as u64,
             visibility_psnr_db: pooled_psnr(&visibility),
+            moving_psnr_db: pooled_psnr(&moving),
             psnr_db: pooled_psnr(&picture),
             ssim: of(|f| f.ssim),
             flip: of(|f| f.flip),

@@ -4,7 +4,7 @@ use dapple_trace::psao::update::StepCounts;
 use serde::{Deserialize, Serialize};
 
 /// Version of this schema.
-pub(crate) const SCHEMA: u32 = 3;
+pub(crate) const SCHEMA: u32 = 4;
 
 /// Everything one evaluation found.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -123,6 +123,8 @@ pub(crate) struct Row {
     /// Pixels of all frames that show geometry.
     pub(crate) compared_pixels: u64,
     pub(crate) visibility_psnr_db: Figure,
+    /// Within reach of what moves.
+    pub(crate) moving_psnr_db: Figure,
     pub(crate) psnr_db: Figure,
     pub(crate) ssim: Figure,
     pub(crate) flip: Figure,
@@ -228,6 +230,9 @@ pub(crate) struct FrameRow {
     pub(crate) time_s: f64,
     /// Absent where equal to the truth, or without geometry.
     pub(crate) visibility_psnr_db: Option<f64>,
+    /// Of pixels within reach of what moves, as above, and how many they are.
+    pub(crate) moving_psnr_db: Option<f64>,
+    pub(crate) moving_pixels: u64,
     pub(crate) psnr_db: Option<f64>,
     pub(crate) ssim: f64,
     pub(crate) flip: f64,

@@ -231,8 +231,9 @@ fn row_data<'a>(
 /// Metrics of single pictures, under the keys of their columns. Single precision is more than a plot shows.
 fn frame_metrics(frames: &[FrameRow]) -> BTreeMap<&'static str, Vec<Option<f32>>> {
     type Metric = (&'static str, fn(&FrameRow) -> Option<f64>);
-    const METRICS: [Metric; 7] = [
+    const METRICS: [Metric; 8] = [
         (columns::VISIBILITY, |f| f.visibility_psnr_db),
+        ("moving_psnr_db", |f| f.moving_psnr_db),
         ("psnr_db", |f| f.psnr_db),
         ("ssim", |f| Some(f.ssim)),
         ("flip", |f| Some(f.flip)),

@@ -31,6 +31,8 @@ fn frame(stem: &str, time_s: f64, quality_db: f64) -> FrameRow {
     FrameRow {
         time_s,
         visibility_psnr_db: Some(quality_db),
+        moving_psnr_db: Some(quality_db - 2.0),
+        moving_pixels: 50,
         psnr_db: Some(quality_db + 10.0),
         ssim: 0.9,
         flip: 1.0 / quality_db,
@@ -52,6 +54,7 @@ fn row(case: &str, method: &str, points: Option<f32>, qualities_db: &[f64]) -> R
         params: Params { points_per_m2: points, hz: points.map(|_| 15.0), ..Params::default() },
         compared_pixels: 200,
         visibility_psnr_db: figure(qualities_db[0]),
+        moving_psnr_db: figure(qualities_db[0] - 2.0),
         psnr_db: figure(40.0),
         ssim: figure(0.9),
         flip: figure(0.04),
