@@ -24,7 +24,7 @@ pub(crate) use encode::{EncodedLayout, delta_payload, encode_layout, snapshot_pa
 pub(crate) use frame::open;
 pub use frame::{FrameHeader, FrameKind, MAGIC, VERSION, seal};
 #[cfg(feature = "publish")]
-pub(crate) use values::{Fit, Goal};
+pub(crate) use values::{Fit, Goal, LEAF, Tolerances};
 pub(crate) use values::{Near, Scratch};
 pub use values::{ValueChange, first_chances};
 

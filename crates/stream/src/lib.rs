@@ -21,4 +21,4 @@ pub use codec::{DecodeError, FrameHeader, FrameKind, Limits, ValueChange};
 pub use recording::{Recorder, Recording, RecordingError, RecordingHeader, Replay};
 pub use session::{Applied, IgnoreReason, ReceiveError, Subscriber};
 #[cfg(feature = "publish")]
-pub use session::{Frame, Precision, Publisher, PublisherConfig};
+pub use session::{Budget, Frame, Precision, Publisher, PublisherConfig, Spending};

@@ -4,9 +4,21 @@
 //! of one group build on each other, groups do not: the newest wins.
 
 #[cfg(feature = "publish")]
+mod budget;
+#[cfg(feature = "publish")]
+mod precision;
+#[cfg(feature = "publish")]
 mod publisher;
 mod subscriber;
+#[cfg(feature = "publish")]
+mod within;
 
 #[cfg(feature = "publish")]
-pub use publisher::{Frame, Precision, Publisher, PublisherConfig};
+pub use budget::Budget;
+#[cfg(feature = "publish")]
+pub use precision::Precision;
+#[cfg(feature = "publish")]
+pub use publisher::{Frame, Publisher, PublisherConfig};
 pub use subscriber::{Applied, IgnoreReason, ReceiveError, Subscriber};
+#[cfg(feature = "publish")]
+pub use within::Spending;

@@ -7,8 +7,17 @@ use super::results::{Figure, FrameRow, Results};
 /// One line a row of the results.
 pub(super) fn rows_csv(results: &Results) -> Result<Vec<u8>> {
     let mut csv = csv::Writer::from_writer(Vec::new());
-    let figures =
-        ["visibility_psnr_db", "moving_psnr_db", "psnr_db", "ssim", "flip", "hdr_flip", "lpips", "flicker", "kbit_per_s"];
+    let figures = [
+        "visibility_psnr_db",
+        "moving_psnr_db",
+        "psnr_db",
+        "ssim",
+        "flip",
+        "hdr_flip",
+        "lpips",
+        "flicker",
+        "kbit_per_s",
+    ];
     let mut titles: Vec<String> =
         ["case", "scene", "path", "method", "points_per_m2", "hz", "rays_per_pixel"]
             .map(str::to_owned)

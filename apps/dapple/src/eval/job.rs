@@ -279,8 +279,7 @@ impl Line {
         let shown = Shown::new(&frame.drawn, visibility.as_deref())?;
         // Everything else is within reach of something that moves.
         let touched = |pixel: usize| frame.still[pixel][0].is_nan();
-        let compared =
-            Compared::new(&frame.truth, &shown, desk.judge, stage.settings.hdr_flip, touched)?;
+        let compared = Compared::new(&frame.truth, &shown, desk.judge, stage.settings.hdr_flip, touched)?;
         let stem = format!("{}/{number:03}-{}", desk.folder, self.method);
         let files = shown.write(desk.out, &stem)?;
         let maps = compared.write(desk.out, &stem)?;

@@ -5,8 +5,11 @@ use std::sync::{Arc, OnceLock};
 use dapple_store::charts::Cuts;
 use dapple_store::points::{Change, PointLayout, PointStore};
 
+use super::precision::Precision;
+use super::within::{ENVELOPE_BYTES, Pressure, Search, Spending};
 use crate::codec::{
-    EncodedLayout, Fit, FrameKind, Goal, Near, Scratch, delta_payload, encode_layout, seal, snapshot_payload,
+    EncodedLayout, Fit, FrameKind, Goal, Near, Scratch, Tolerances, ValueChange, delta_payload,
+    encode_layout, seal, snapshot_payload,
 };
 
 /// How a [`Publisher`] numbers and cuts its groups, and how exact its deltas are.
@@ -22,27 +25,6 @@ pub struct PublisherConfig {
     pub deltas_per_group: u32,
     /// How exact deltas are.
     pub precision: Precision,
-}
-
-/// How exact deltas are, in 255ths of visibility. The first snapshot of a layout is exact; others hold what the deltas came to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Precision {
-    /// What subscribers hold is at most this far from what was published, always: a change that leaves a point within is not
-    /// sent. Default 0: everything is sent exactly. At most 127; more is taken as that.
-    pub tolerance: u8,
-    /// What is sent is a multiple of this beside what is expected: larger is shorter, and less exact within the tolerance.
-    /// 1 … 2 `tolerance` + 1, more is taken as that; 0 (default) is the smaller of 2 `tolerance` and 8, or the tolerance if
-    /// that is more (`README.md` has the measurements).
-    pub step: u8,
-}
-
-impl Precision {
-    /// Tolerance and step within their ranges.
-    fn in_range(self) -> Precision {
-        let tolerance = self.tolerance.min(127);
-        let step = if self.step == 0 { tolerance.max((2 * tolerance).min(8)) } else { self.step };
-        Precision { tolerance, step: step.clamp(1, 2 * tolerance + 1) }
-    }
 }
 
 /// One frame, ready for any transport.
@@ -82,6 +64,7 @@ struct State {
     near: Near,
     scratch: Scratch,
     fit: Fit,
+    pressure: Pressure,
     group: u64,
     /// Epoch of the last change, not of the last call.
     epoch: u64,
@@ -118,21 +101,30 @@ impl Publisher {
     /// What changed is found here, by comparison with what subscribers hold, which [`Publisher::store`] then is. The frame is a
     /// delta, or a snapshot where a group starts: at first, with a new layout, and as [`PublisherConfig::deltas_per_group`] says.
     pub fn publish(&mut self, store: &PointStore) -> Option<Frame> {
+        self.publish_within(store, &Spending::default())
+    }
+
+    /// As [`Publisher::publish`], with a delta that takes no more than so many bytes: what matters least is left as it is, or less
+    /// exact, until a later call has room for it. Then what subscribers hold can be farther off than the tolerance. Where nothing worth
+    /// saying fits, nothing is sent.
+    ///
+    /// Snapshots are as long as they are; and where a group starts, subscribers get to the values that a delta within
+    /// the limit would have brought.
+    pub fn publish_within(&mut self, store: &PointStore, spending: &Spending<'_>) -> Option<Frame> {
         let epoch = self.next_epoch;
         let (frame, changed) = match &mut self.state {
             Some(state) if same_layout(state.store.layout(), store.layout()) => {
                 let precision = self.config.precision.in_range();
                 let full = self.config.deltas_per_group;
-                let held = state.store.visibility();
-                match Goal::new(held, store.visibility(), precision.tolerance, precision.step) {
+                match state.encode_within(epoch, store.visibility(), precision, spending) {
                     None => (None, 0),
-                    Some(goal) if full > 0 && state.deltas >= full => {
+                    Some(delta) if full > 0 && state.deltas >= full => {
                         // To the same values as without a new group: what subscribers hold does not depend on when groups start.
-                        let (_, changed) = state.advance(epoch, goal);
+                        let (_, changed) = state.advance(epoch, delta);
                         (Some(state.start_group(epoch, &self.scene_hash)), changed)
                     }
-                    Some(goal) => {
-                        let (frame, changed) = state.advance(epoch, goal);
+                    Some(delta) => {
+                        let (frame, changed) = state.advance(epoch, delta);
                         (Some(frame), changed)
                     }
                 }
@@ -149,6 +141,7 @@ impl Publisher {
                     encoded,
                     scratch: Scratch::default(),
                     fit: Fit::default(),
+                    pressure: Pressure::default(),
                     group,
                     epoch,
                     deltas: 0,
@@ -233,25 +226,87 @@ impl State {
         frame
     }
 
-    /// Goes on to values within the goal, in the same group. Also says how many changed.
-    fn advance(&mut self, epoch: u64, goal: Goal<'_>) -> (Frame, usize) {
+    /// The delta to values as near to these as fits; `None` where there is nothing to say, or nothing fits.
+    fn encode_within(
+        &mut self,
+        epoch: u64,
+        values: &[u8],
+        precision: Precision,
+        spending: &Spending<'_>,
+    ) -> Option<Delta> {
+        let Some(most_bytes) = spending.most_bytes else {
+            self.pressure = Pressure::default();
+            return self.encode(epoch, values, Tolerances::Even(precision.tolerance), precision.step);
+        };
+        let most = most_bytes.saturating_sub(ENVELOPE_BYTES);
+        let mut best: Option<Delta> = None;
+        let mut search = Search::new(self.pressure, precision, spending.coarseness);
+        loop {
+            let pressure = search.pressure();
+            let found = if pressure.is_none() {
+                self.encode(epoch, values, Tolerances::Even(precision.tolerance), precision.step)
+            } else {
+                let (tolerances, step) = pressure.tolerances(precision, spending.coarseness, values.len());
+                self.encode(epoch, values, Tolerances::Each(&tolerances), step)
+            };
+            let bytes = found.as_ref().map_or(0, |delta| delta.payload.len());
+            self.pressure = pressure;
+            if let Some(delta) = found
+                && bytes <= most
+                && best.as_ref().is_none_or(|best| best.payload.len() < bytes)
+            {
+                best = Some(Delta { pressure, ..delta });
+            }
+            match search.next(bytes, most) {
+                Some(further) => search = further,
+                None => break,
+            }
+        }
+        if let Some(best) = &best {
+            self.pressure = best.pressure;
+        }
+        best
+    }
+
+    /// The delta to values that are no farther from these than they may be; `None` where there is nothing to say.
+    fn encode(&mut self, epoch: u64, values: &[u8], tolerances: Tolerances<'_>, step: u8) -> Option<Delta> {
         let layout = self.store.layout().clone();
+        let held = self.store.visibility();
+        let goal = Goal::new(held, values, tolerances, step)?;
+        let mut fit = self.fit;
         let (payload, changes) = delta_payload(
             epoch - self.epoch,
             (&layout, &mut self.near),
-            self.store.visibility(),
+            held,
             goal,
-            &mut self.fit,
+            &mut fit,
             &mut self.scratch,
         );
+        Some(Delta { payload, changes, fit, pressure: Pressure::default() })
+    }
+
+    /// Goes on to the values of a delta, in the same group. Also says how many changed.
+    fn advance(&mut self, epoch: u64, delta: Delta) -> (Frame, usize) {
+        let Delta { payload, changes, fit, .. } = delta;
         let news: Vec<Change> =
             changes.iter().map(|c| Change { point: c.point, visibility: c.new }).collect();
         self.store.apply(&news).expect("changes are of points of the store");
+        self.fit = fit;
         self.epoch = epoch;
         self.deltas = self.deltas.saturating_add(1);
         self.snapshot = OnceLock::new();
         (Frame::new(FrameKind::Delta, self.group, epoch, &payload), changes.len())
     }
+}
+
+/// A delta that can be sent.
+struct Delta {
+    payload: Vec<u8>,
+    changes: Vec<ValueChange>,
+    /// What is learned from it.
+    fit: Fit,
+    /// What it took to make it fit.
+    pressure: Pressure,
 }
 
 impl Frame {

@@ -14,7 +14,7 @@ use crate::codec::entropy::{Chance, Coder};
 const LEVELS: [usize; 4] = [4096, 512, BLOCK, LEAF];
 
 /// Points of the smallest stretch: all of them are coded, or none.
-pub(super) const LEAF: usize = 16;
+pub(crate) const LEAF: usize = 16;
 
 /// Largest share of the neighbours' change that a point can be expected to follow, in 64ths.
 pub(crate) const MOST_FOLLOW: u8 = 128;

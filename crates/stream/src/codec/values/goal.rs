@@ -41,11 +41,29 @@ impl Fit {
     }
 }
 
+/// How far off what subscribers hold may be, 255ths: more than any difference in a stretch that is not to be coded.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Tolerances<'a> {
+    /// Everywhere.
+    Even(u8),
+    /// For each of the smallest stretches.
+    Each(&'a [u8]),
+}
+
+impl Tolerances<'_> {
+    fn of_leaf(&self, leaf: usize) -> u8 {
+        match self {
+            Tolerances::Even(tolerance) => *tolerance,
+            Tolerances::Each(tolerances) => tolerances[leaf],
+        }
+    }
+}
+
 /// Values that a delta is to bring subscribers near to.
 #[derive(Debug)]
 pub(crate) struct Goal<'a> {
     values: &'a [u8],
-    tolerance: i32,
+    tolerances: Tolerances<'a>,
     step: i32,
     /// Which of the smallest stretches hold a point that is too far off.
     leaves: Vec<bool>,
@@ -54,17 +72,22 @@ pub(crate) struct Goal<'a> {
 }
 
 impl<'a> Goal<'a> {
-    /// From values `held` to `values`; `None` where none is more than `tolerance` off. `step` is at most
-    /// 2 `tolerance` + 1, so that every value can be brought as near.
-    pub(crate) fn new(held: &[u8], values: &'a [u8], tolerance: u8, step: u8) -> Option<Goal<'a>> {
-        let far = |(a, b): (&[u8], &[u8])| {
+    /// From values `held` to `values`; `None` where none is farther off than it may be. `step` is at most
+    /// 2 × the least tolerance + 1, so that every value can be brought as near.
+    pub(crate) fn new(
+        held: &[u8],
+        values: &'a [u8],
+        tolerances: Tolerances<'a>,
+        step: u8,
+    ) -> Option<Goal<'a>> {
+        let far = |(leaf, (a, b)): (usize, (&[u8], &[u8]))| {
             // No early end, so that it is done many points at a time.
-            a.iter().zip(b).fold(0, |most, (a, b)| most.max(a.abs_diff(*b))) > tolerance
+            a.iter().zip(b).fold(0, |most, (a, b)| most.max(a.abs_diff(*b))) > tolerances.of_leaf(leaf)
         };
-        let leaves: Vec<bool> = held.chunks(LEAF).zip(values.chunks(LEAF)).map(far).collect();
+        let leaves: Vec<bool> = held.chunks(LEAF).zip(values.chunks(LEAF)).enumerate().map(far).collect();
         leaves.contains(&true).then_some(Goal {
             values,
-            tolerance: tolerance.into(),
+            tolerances,
             step: step.into(),
             leaves,
             along: 0,
@@ -92,10 +115,11 @@ impl Guide for Goal<'_> {
         }
         let off = value - expected;
         let size = off.abs();
-        if size <= self.tolerance {
+        let tolerance = i32::from(self.tolerances.of_leaf(point / LEAF));
+        if size <= tolerance {
             return 0;
         }
         // The smallest number that comes near enough.
-        (size - self.tolerance + self.step - 1) / self.step * off.signum()
+        (size - tolerance + self.step - 1) / self.step * off.signum()
     }
 }

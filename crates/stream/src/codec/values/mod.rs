@@ -8,9 +8,9 @@ mod snapshot;
 mod start;
 
 pub use delta::ValueChange;
-pub(crate) use delta::{Guide, MOST_FOLLOW, Scale, Scratch, code_changes};
+pub(crate) use delta::{Guide, LEAF, MOST_FOLLOW, Scale, Scratch, code_changes};
 #[cfg(feature = "publish")]
-pub(crate) use goal::{Fit, Goal};
+pub(crate) use goal::{Fit, Goal, Tolerances};
 pub(crate) use near::Near;
 pub(crate) use snapshot::code_values;
 pub use start::first_chances;
