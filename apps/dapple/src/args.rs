@@ -112,7 +112,7 @@ pub(crate) struct VisibilityArgs {
     pub(crate) seed: u32,
 }
 
-/// What a server spends on each of its steps.
+/// What a server spends: on each of its steps, and on what it sends.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 pub(crate) struct StepArgs {
     /// Rays a server step may take, spent first on what is seen, on what changes and on what has waited; the rest is done
@@ -123,6 +123,40 @@ pub(crate) struct StepArgs {
     /// leaves over; 0: no more than --point-rays. Without --ray-budget the first steps are as slow as the start.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) rays_still: u32,
+    /// Most bits of updates in any second, as in 500k or 2M: what is out of view, far away or nearly right waits or is less
+    /// exact [default: as many as it takes].
+    #[arg(long, value_name = "BITS/S")]
+    pub(crate) budget: Option<BitRate>,
+}
+
+/// Bits a second.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct BitRate(pub(crate) u64);
+
+impl FromStr for BitRate {
+    type Err = String;
+
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        let (number, unit) = match s.as_bytes().last() {
+            Some(b'k' | b'K') => (&s[..s.len() - 1], 1e3),
+            Some(b'm' | b'M') => (&s[..s.len() - 1], 1e6),
+            _ => (s, 1.0),
+        };
+        match number.parse::<f64>().map(|number| number * unit) {
+            // Less than a frame a second says nothing.
+            Ok(bits) if (1000.0..=1e12).contains(&bits) => Ok(BitRate(bits.round() as u64)),
+            _ => Err("write bits a second, 1k to 1000000M, as in 500k, 0.5M or 2M".into()),
+        }
+    }
+}
+
+impl std::fmt::Display for BitRate {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.0 as f64 {
+            bits if bits >= 1e6 => write!(f, "{}M", bits / 1e6),
+            bits => write!(f, "{}k", bits / 1e3),
+        }
+    }
 }
 
 #[derive(Debug, Clone, Args)]

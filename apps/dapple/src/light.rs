@@ -19,11 +19,12 @@ const STILL_SECONDS: f64 = 10.0;
 
 /// What a server is to do.
 pub(crate) fn server_config(scene: &Scene, args: &LightArgs) -> Result<ServerConfig> {
-    let LightArgs { points, hz, visibility, step } = args;
-    if !(points.is_finite() && *points > 0.0) {
+    let LightArgs { visibility, step, .. } = args;
+    let (points, hz) = (args.points_per_m2(), args.hz());
+    if !(points.is_finite() && points > 0.0) {
         bail!("--points is {points}, must be above 0");
     }
-    if !(hz.is_finite() && *hz > 0.0 && *hz <= 1000.0) {
+    if !(hz.is_finite() && hz > 0.0 && hz <= 1000.0) {
         bail!("--hz is {hz}, must be above 0 to 1000");
     }
     let (radius_m, density_factor) = source::resolve_radius(scene, visibility)?;
@@ -35,6 +36,7 @@ pub(crate) fn server_config(scene: &Scene, args: &LightArgs) -> Result<ServerCon
         },
         update: UpdateParams { rays: visibility.point_rays, rays_still: step.rays_still, radius_m },
         publish: PublisherConfig { precision: precision(visibility), ..PublisherConfig::default() },
+        bits_per_s: args.bits_per_s(),
         ..ServerConfig::default()
     })
 }
@@ -84,7 +86,7 @@ pub(crate) fn record(take: &Take<'_>) -> Result<Taken> {
     if !(take.snapshot_every_s > 0.0 && take.snapshot_every_s.is_finite()) {
         bail!("--snapshot-every is {}, must be above 0", take.snapshot_every_s);
     }
-    let hz = take.light.hz;
+    let hz = take.light.hz();
     let mut config = server_config(scene, take.light)?;
     // A group of D deltas is closed by a snapshot, so D + 1 updates lie between snapshots.
     let deltas = (take.snapshot_every_s * hz).ceil() - 1.0;

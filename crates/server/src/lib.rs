@@ -11,7 +11,7 @@ use std::sync::Arc;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Pose, Scene};
 use dapple_store::points::PointStore;
-use dapple_stream::{Frame, Precision, Publisher, PublisherConfig};
+use dapple_stream::{Budget, Frame, FrameKind, Precision, Publisher, PublisherConfig, Spending};
 use dapple_trace::Tracer;
 use dapple_trace::psao::cuts::find_cuts;
 use dapple_trace::psao::generate::{
@@ -29,6 +29,9 @@ pub struct ServerConfig {
     pub update: UpdateParams,
     /// How changes are grouped, and how exactly they are sent. Its default here lets values be off by 4 of 255.
     pub publish: PublisherConfig,
+    /// Most bits that deltas take in any second; `None` (default): as many as they need. Under it what matters least to viewers waits, or is
+    /// less exact: what is out of view, far away, or nearly right. Snapshots are not counted.
+    pub bits_per_s: Option<u64>,
     /// Whether rays find out which points must not count at which texels of a client's atlas, because something solid stands
     /// between them. Costs some seconds at the start and some bytes of each snapshot; light leaks less. Default true.
     pub cuts: bool,
@@ -51,6 +54,7 @@ impl Default for ServerConfig {
             generate: GenerateParams::default(),
             update: UpdateParams::default(),
             publish: PublisherConfig { precision: Precision { tolerance: 4, step: 0 }, ..Default::default() },
+            bits_per_s: None,
             cuts: true,
         }
     }
@@ -97,6 +101,8 @@ pub struct StepReport {
     pub counts: StepCounts,
     /// Points whose published visibility changed.
     pub changed: u32,
+    /// Points that subscribers hold less exactly than they should, because the budget of bits did not reach.
+    pub held_back: u32,
 }
 
 /// A scene that is being lit. A clone goes on from the same state by itself.
@@ -106,6 +112,8 @@ pub struct Server {
     tracer: Tracer,
     updater: Updater,
     publisher: Publisher,
+    budget: Option<Budget>,
+    tolerance: u8,
     dropped_inside: u32,
 }
 
@@ -145,7 +153,9 @@ impl Server {
             publisher.set_cuts(layout.clone(), cuts);
         }
         publisher.publish(updater.store());
-        Ok(Server { scene, tracer, updater, publisher, dropped_inside })
+        let budget = config.bits_per_s.map(Budget::new);
+        let tolerance = config.publish.precision.tolerance;
+        Ok(Server { scene, tracer, updater, publisher, budget, tolerance, dropped_inside })
     }
 
     /// Brings the scene to `now_s` (seconds) and publishes what changed. Time may run in any direction. Takes as many rays
@@ -157,17 +167,54 @@ impl Server {
     /// As [`Server::step`] within a budget of rays, spent first where viewers look. What does not fit is published by later
     /// steps, so a server that runs short falls behind a little everywhere instead of stopping anywhere.
     pub fn step_with(&mut self, now_s: f64, input: &StepInput<'_>) -> Result<StepReport, ServerError> {
+        self.step_at(now_s, now_s, input)
+    }
+
+    /// As [`Server::step_with`], of a scene whose time is not the clock's: `sent_s` (seconds, never falling) is when the frame goes out, which
+    /// a budget of bits goes by.
+    pub fn step_at(
+        &mut self,
+        now_s: f64,
+        sent_s: f64,
+        input: &StepInput<'_>,
+    ) -> Result<StepReport, ServerError> {
         let pose = self.scene.pose(now_s);
         self.tracer.update(&self.scene, &pose);
         let report = self.updater.step(&self.scene, &pose, &mut self.tracer, input);
-        let frame = self.publisher.publish(self.updater.store());
+        let frame = match &mut self.budget {
+            None => self.publisher.publish(self.updater.store()),
+            Some(budget) => {
+                let coarseness = self.updater.coarseness(input.interest, Spending::STRETCH);
+                let most_bytes = Some(budget.allowance(sent_s));
+                let spending = Spending { most_bytes, coarseness: &coarseness };
+                let frame = self.publisher.publish_within(self.updater.store(), &spending);
+                let delta = frame.as_ref().filter(|frame| frame.kind == FrameKind::Delta);
+                budget.spend(delta.map_or(0, |frame| frame.bytes.len()));
+                frame
+            }
+        };
         Ok(StepReport {
             frame,
             traced: report.counts.traced(),
             rays: report.counts.rays(),
             counts: report.counts,
             changed: self.publisher.changed(),
+            held_back: self.held_back(),
         })
+    }
+
+    /// From now on deltas take at most so many bits in any second; `None`: as many as they need.
+    pub fn set_bits_per_s(&mut self, bits_per_s: Option<u64>) {
+        self.budget = bits_per_s.map(Budget::new);
+    }
+
+    /// Points that a budget of bits did not reach.
+    fn held_back(&self) -> u32 {
+        if self.budget.is_none() {
+            return 0;
+        }
+        let pairs = self.store().visibility().iter().zip(self.traced().visibility());
+        pairs.filter(|(held, traced)| held.abs_diff(**traced) > self.tolerance).count() as u32
     }
 
     /// The snapshot that brings a subscriber that joins now up to date. Encoded at most once an update.
@@ -185,7 +232,8 @@ impl Server {
         self.publisher.store().expect("a server publishes as it starts")
     }
 
-    /// What was traced: what has been published is nowhere farther from it than the publisher's tolerance.
+    /// What was traced: what has been published is nowhere farther from it than the publisher's tolerance, but for
+    /// [`StepReport::held_back`] points.
     pub fn traced(&self) -> &PointStore {
         self.updater.store()
     }

@@ -7,7 +7,7 @@ use clap::Args;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 
-use super::{EvalVerb, JudgeArgs, Method, Radius, Size};
+use super::{BitRate, EvalVerb, JudgeArgs, Method, Preset, Radius, Size};
 
 pub(super) const EVAL_EXAMPLES: &str = "\
 Examples:
@@ -48,7 +48,7 @@ pub(crate) struct EvalArgs {
     #[arg(long, conflicts_with_all = [
         "scenes", "builtin", "suite", "detail", "animation", "methods", "frames", "size", "points", "hz", "path",
         "seconds", "reference_rays", "supersample", "radius", "point_rays", "threshold", "seed", "ray_budget",
-        "rays_still", "hdr_flip", "record", "ppd",
+        "rays_still", "budget", "preset", "hdr_flip", "record", "ppd",
     ])]
     pub(crate) smoke: bool,
     /// Threads; 0 is one for each core.
@@ -140,6 +140,13 @@ pub(crate) struct Options {
     /// leaves over; 0: no more than --point-rays [default: 0].
     #[arg(long, value_name = "N")]
     pub(crate) rays_still: Option<u32>,
+    /// Most bits of updates in any second, as in 500k or 2M: what is out of view, far away or nearly right waits or is less
+    /// exact [default: as many as it takes].
+    #[arg(long, value_name = "BITS/S")]
+    pub(crate) budget: Option<BitRate>,
+    /// Points, updates a second and budget that fit a device, where they are not given.
+    #[arg(long, value_enum)]
+    pub(crate) preset: Option<Preset>,
     /// Also compute HDR-FLIP, on linear light before tone mapping (several times the work of FLIP).
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL")]
     pub(crate) hdr_flip: Option<bool>,
@@ -167,6 +174,8 @@ impl Options {
             seed: self.seed.or(other.seed),
             ray_budget: self.ray_budget.or(other.ray_budget),
             rays_still: self.rays_still.or(other.rays_still),
+            budget: self.budget.or(other.budget),
+            preset: self.preset.or(other.preset),
             hdr_flip: self.hdr_flip.or(other.hdr_flip),
         }
     }
@@ -218,4 +227,4 @@ enum Text {
     Number(f64),
 }
 
-deserialize_as_text!(Method, Size, Radius);
+deserialize_as_text!(Method, Size, Radius, BitRate);

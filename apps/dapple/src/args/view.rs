@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use dapple_client::viewer::{DebugView, Method};
 
-use super::{SceneChoice, Size, StepArgs, VisibilityArgs};
+use serde::Deserialize;
+
+use super::{BitRate, SceneChoice, Size, StepArgs, VisibilityArgs};
 
 pub(crate) const VIEW_EXAMPLES: &str = "\
 Examples:
@@ -89,15 +91,44 @@ pub(crate) struct ViewArgs {
     pub(crate) out: Option<PathBuf>,
 }
 
-/// How much effort a device can make.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+/// How much effort a device can make, and how much a connection to it can carry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub(crate) enum Preset {
-    /// 256 points a square metre, 1 sample, small shadow maps.
+    /// 256 points a square metre; sent 15 times a second, 0.5 Mbit/s; drawn with 1 sample, small shadow maps.
     Phone,
-    /// 512 points a square metre, 4 samples, small shadow maps.
+    /// 512 points a square metre; sent 30 times a second, 2 Mbit/s; drawn with 4 samples, small shadow maps.
     Headset,
-    /// 512 points a square metre, 4 samples, large shadow maps.
+    /// 512 points a square metre; sent 60 times a second, 8 Mbit/s; drawn with 4 samples, large shadow maps.
     Desktop,
+}
+
+impl Preset {
+    /// Points spawned a square metre.
+    pub(crate) fn points_per_m2(self) -> f32 {
+        match self {
+            Preset::Phone => 256.0,
+            Preset::Headset | Preset::Desktop => 512.0,
+        }
+    }
+
+    /// Updates a second.
+    pub(crate) fn hz(self) -> f64 {
+        match self {
+            Preset::Phone => 15.0,
+            Preset::Headset => 30.0,
+            Preset::Desktop => 60.0,
+        }
+    }
+
+    /// Most bits of updates in any second.
+    pub(crate) fn budget(self) -> BitRate {
+        BitRate(match self {
+            Preset::Phone => 500_000,
+            Preset::Headset => 2_000_000,
+            Preset::Desktop => 8_000_000,
+        })
+    }
 }
 
 /// A viewer's [`Method`] by name.

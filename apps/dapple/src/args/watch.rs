@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{SceneChoice, StepArgs, VisibilityArgs};
+use super::{Preset, SceneChoice, StepArgs, VisibilityArgs};
 
 pub(crate) const RECORD_EXAMPLES: &str = "\
 Examples:
@@ -32,16 +32,34 @@ With the environment variable CI set it fetches its own page once and ends.";
 /// How points are laid and updated.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct LightArgs {
-    /// Points spawned a square metre; half are kept.
-    #[arg(long, value_name = "N", default_value_t = 512.0, allow_hyphen_values = true)]
-    pub(crate) points: f32,
-    /// Server updates a second.
-    #[arg(long, value_name = "H", default_value_t = 15.0, allow_hyphen_values = true)]
-    pub(crate) hz: f64,
+    /// Points, updates a second and budget that fit a device, where they are not given.
+    #[arg(long, value_enum)]
+    pub(crate) preset: Option<Preset>,
+    /// Points spawned a square metre; half are kept [default: 512, or the preset's].
+    #[arg(long, value_name = "N", allow_hyphen_values = true)]
+    pub(crate) points: Option<f32>,
+    /// Server updates a second [default: 15, or the preset's].
+    #[arg(long, value_name = "H", allow_hyphen_values = true)]
+    pub(crate) hz: Option<f64>,
     #[command(flatten)]
     pub(crate) visibility: VisibilityArgs,
     #[command(flatten)]
     pub(crate) step: StepArgs,
+}
+
+impl LightArgs {
+    pub(crate) fn points_per_m2(&self) -> f32 {
+        self.points.or(self.preset.map(Preset::points_per_m2)).unwrap_or(512.0)
+    }
+
+    pub(crate) fn hz(&self) -> f64 {
+        self.hz.or(self.preset.map(Preset::hz)).unwrap_or(15.0)
+    }
+
+    /// Most bits of updates in any second.
+    pub(crate) fn bits_per_s(&self) -> Option<u64> {
+        self.step.budget.or(self.preset.map(Preset::budget)).map(|rate| rate.0)
+    }
 }
 
 #[derive(Debug, Clone, Args)]

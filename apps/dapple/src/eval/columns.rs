@@ -218,13 +218,14 @@ pub(super) fn bytes(count: u64) -> String {
 /// always, the rest where it differs.
 pub(super) fn settings(case: &Case) -> Vec<Setting> {
     type Part = (&'static str, bool, fn(&Params) -> Option<String>);
-    const PARTS: [Part; 7] = [
+    const PARTS: [Part; 8] = [
         ("points_per_m2", true, |p| p.points_per_m2.map(|n| format!("N {n}"))),
         ("hz", true, |p| p.hz.map(|hz| format!("{hz} Hz"))),
         ("rays_per_pixel", true, |p| p.rays_per_pixel.map(|rays| format!("{rays} rays"))),
         ("point_rays", false, |p| p.point_rays.map(|rays| format!("{rays} rays a point"))),
         ("threshold", false, |p| p.threshold.map(|t| format!("threshold {t}"))),
         ("ray_budget", false, |p| p.ray_budget.map(|rays| format!("{} rays a step", number(rays as f64, 0)))),
+        ("budget_kbit_per_s", false, |p| p.budget_kbit_per_s.map(|kbit| format!("at most {}", bits(kbit)))),
         ("rays_still", false, |p| p.rays_still.map(|rays| format!("{rays} rays at rest"))),
     ];
     let of_row = |row: &Row| {

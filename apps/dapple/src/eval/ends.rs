@@ -67,11 +67,13 @@ pub(super) struct AnyStep {
     pub(super) packet: Option<Packet>,
     pub(super) counts: StepCounts,
     pub(super) rays: u64,
+    /// Points whose changes wait for bits.
+    pub(super) held_back: u32,
 }
 
 impl AnyStep {
     fn new(bytes: Option<Arc<[u8]>>, counts: StepCounts) -> AnyStep {
-        AnyStep { packet: bytes.map(Packet::from), rays: counts.rays(), counts }
+        AnyStep { packet: bytes.map(Packet::from), rays: counts.rays(), counts, held_back: 0 }
     }
 }
 
@@ -82,8 +84,14 @@ fn camera_at(stage: &Stage<'_>, time_s: f64) -> PosedCamera {
 
 impl AnyServer {
     /// Either of them, from a server at its start.
-    pub(super) fn new(server: Server, is_paper: bool, threshold: u8) -> Result<AnyServer> {
+    pub(super) fn new(
+        mut server: Server,
+        is_paper: bool,
+        threshold: u8,
+        bits_per_s: Option<u64>,
+    ) -> Result<AnyServer> {
         if !is_paper {
+            server.set_bits_per_s(bits_per_s);
             return Ok(AnyServer::Own(Box::new(server)));
         }
         let params = PaperParams { threshold, ..PaperParams::default() };
@@ -145,11 +153,18 @@ impl AnyServer {
         }
     }
 
-    pub(super) fn step(&mut self, time_s: f64, input: &StepInput<'_>, stage: &Stage<'_>) -> Result<AnyStep> {
+    /// Steps with the scene at a time; the second one is that of the clock, which never falls.
+    pub(super) fn step(
+        &mut self,
+        (time_s, sent_s): (f64, f64),
+        input: &StepInput<'_>,
+        stage: &Stage<'_>,
+    ) -> Result<AnyStep> {
         match self {
             AnyServer::Own(server) => {
-                let report = server.step_with(time_s, input)?;
-                Ok(AnyStep::new(report.frame.map(|frame| frame.bytes), report.counts))
+                let report = server.step_at(time_s, sent_s, input)?;
+                let step = AnyStep::new(report.frame.map(|frame| frame.bytes), report.counts);
+                Ok(AnyStep { held_back: report.held_back, ..step })
             }
             AnyServer::Paper(server) => {
                 let size = stage.settings.size;
@@ -162,7 +177,7 @@ impl AnyServer {
             AnyServer::Sas(server) => {
                 let step = server.step(time_s, &camera_at(stage, time_s))?;
                 let packet = step.frame.as_ref().map(Packet::from);
-                Ok(AnyStep { packet, counts: StepCounts::default(), rays: step.rays })
+                Ok(AnyStep { packet, counts: StepCounts::default(), rays: step.rays, held_back: 0 })
             }
         }
     }

@@ -149,7 +149,12 @@ impl Job {
             Job::Points { points_per_m2, hz, .. } => {
                 let start = Start::new(stage, *points_per_m2);
                 let server = starts.server(stage.loaded, &start, &|part| progress(0.3 * part))?;
-                let server = AnyServer::new(server, self.is_paper(), stage.settings.threshold)?;
+                let server = AnyServer::new(
+                    server,
+                    self.is_paper(),
+                    stage.settings.threshold,
+                    stage.settings.step.budget.map(|budget| budget.0),
+                )?;
                 let pair = Pair::new(server, (Some(*points_per_m2), *hz), stage, desk.record)?;
                 if self.methods().contains(&Method::Psao) {
                     // Made once a session, so not what a picture costs.
@@ -359,6 +364,11 @@ impl Line {
                 .and_then(|p| p.points_per_m2)
                 .map(|_| settings.step.rays_still)
                 .filter(|rays| *rays > 0),
+            budget_kbit_per_s: pair
+                .filter(|_| !self.method.is_paper())
+                .and_then(|p| p.points_per_m2)
+                .and(settings.step.budget)
+                .map(|budget| budget.0 as f64 / 1e3),
             rays_per_pixel: match self.method {
                 Method::Rtao { rays } => Some(rays),
                 _ => None,

@@ -13,6 +13,7 @@ use dapple_trace::psao::update::{ConvexVolume, StepInput, UpdateParams};
 use super::ends::{AnyClient, AnyServer};
 use super::results::Steps;
 use super::stage::Stage;
+use crate::args::StepArgs;
 use crate::light::microseconds;
 use crate::source::Loaded;
 
@@ -137,7 +138,9 @@ pub(super) struct Pair {
     pub(super) server_seconds: f64,
     pub(super) apply_seconds: f64,
     server: AnyServer,
-    ray_budget: Option<u64>,
+    step: StepArgs,
+    /// When the next frame that is not counted would go out, seconds; after all that are.
+    clock_s: f64,
     recording: Option<Recording>,
 }
 
@@ -145,7 +148,7 @@ pub(super) struct Pair {
 pub(super) struct StepAt {
     /// Whether the client's light changed.
     pub(super) changed: bool,
-    /// Points left to later steps.
+    /// Points left to later steps, for want of rays or bits.
     pub(super) backlog: u32,
 }
 
@@ -190,7 +193,8 @@ impl Pair {
             server_seconds: 0.0,
             apply_seconds: 0.0,
             server,
-            ray_budget: stage.settings.step.ray_budget,
+            step: stage.settings.step,
+            clock_s: 0.0,
             recording,
         })
     }
@@ -205,9 +209,10 @@ impl Pair {
                 return Ok(changed);
             }
             let start = Instant::now();
-            let interest = interest(tick_s, self.hz, self.ray_budget, stage);
-            let input = StepInput { ray_budget: self.ray_budget, interest: &interest };
-            let report = self.server.step(tick_s, &input, stage)?;
+            let interest = interest(tick_s, self.hz, &self.step, stage);
+            let input = StepInput { ray_budget: self.step.ray_budget, interest: &interest };
+            let report = self.server.step((tick_s, tick_s), &input, stage)?;
+            self.clock_s = tick_s;
             self.server_seconds += start.elapsed().as_secs_f64();
             self.rays += report.rays;
             self.steps.add(&report.counts);
@@ -229,13 +234,14 @@ impl Pair {
 
     /// Steps once with the scene at `time_s`, uncounted.
     pub(super) fn step_at(&mut self, time_s: f64, stage: &Stage<'_>) -> Result<StepAt> {
-        let interest = interest(time_s, self.hz, self.ray_budget, stage);
-        let input = StepInput { ray_budget: self.ray_budget, interest: &interest };
-        let report = self.server.step(time_s, &input, stage)?;
+        let interest = interest(time_s, self.hz, &self.step, stage);
+        let input = StepInput { ray_budget: self.step.ray_budget, interest: &interest };
+        self.clock_s += 1.0 / self.hz;
+        let report = self.server.step((time_s, self.clock_s), &input, stage)?;
         if let Some(packet) = &report.packet {
             self.client.receive(packet).context("the client refused the server's frame")?;
         }
-        Ok(StepAt { changed: report.packet.is_some(), backlog: report.counts.backlog })
+        Ok(StepAt { changed: report.packet.is_some(), backlog: report.counts.backlog.max(report.held_back) })
     }
 
     pub(super) fn cut_bytes(&self) -> u64 {
@@ -251,8 +257,8 @@ impl Pair {
 }
 
 /// What the viewer sees by the next tick, where a budget asks for it.
-fn interest(tick_s: f64, hz: f64, ray_budget: Option<u64>, stage: &Stage<'_>) -> Vec<ConvexVolume> {
-    if ray_budget.is_none() {
+fn interest(tick_s: f64, hz: f64, step: &StepArgs, stage: &Stage<'_>) -> Vec<ConvexVolume> {
+    if step.ray_budget.is_none() && step.budget.is_none() {
         return Vec::new();
     }
     let scene = stage.scene();

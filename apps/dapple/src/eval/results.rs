@@ -221,6 +221,8 @@ pub(crate) struct Params {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) rays_still: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) budget_kbit_per_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) rays_per_pixel: Option<u32>,
 }
 

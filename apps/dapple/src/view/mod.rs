@@ -74,8 +74,10 @@ fn check(args: &ViewArgs) -> Result<()> {
 fn open(args: &ViewArgs) -> Result<Opening> {
     let quality = Quality::from_args(args);
     let light = LightArgs {
-        points: quality.points_per_m2,
-        hz: args.hz.unwrap_or(DEFAULT_HZ),
+        // Of the preset's, only what is drawn: nothing is sent anywhere.
+        preset: None,
+        points: Some(quality.points_per_m2),
+        hz: Some(args.hz.unwrap_or(DEFAULT_HZ)),
         visibility: args.visibility.clone(),
         step: args.step,
     };

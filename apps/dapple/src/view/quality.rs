@@ -14,11 +14,12 @@ pub(super) struct Quality {
 
 impl Quality {
     pub(super) fn of(preset: Preset) -> Quality {
-        match preset {
-            Preset::Phone => Quality { samples: 1, shadow_resolution: 1024, points_per_m2: 256.0 },
-            Preset::Headset => Quality { samples: 4, shadow_resolution: 1024, points_per_m2: 512.0 },
-            Preset::Desktop => Quality { samples: 4, shadow_resolution: 2048, points_per_m2: 512.0 },
-        }
+        let (samples, shadow_resolution) = match preset {
+            Preset::Phone => (1, 1024),
+            Preset::Headset => (4, 1024),
+            Preset::Desktop => (4, 2048),
+        };
+        Quality { samples, shadow_resolution, points_per_m2: preset.points_per_m2() }
     }
 
     /// The preset of the arguments, with what they say otherwise.

@@ -119,7 +119,7 @@ impl Show {
         let viewer = Viewer::new(gpu, self.scene.clone(), viewer_config(&quality, self.viewer.format()))?;
         let points_differ = quality.points_per_m2 != self.quality.points_per_m2;
         if points_differ && matches!(self.feed, Feed::Live(_)) {
-            let light = LightArgs { points: quality.points_per_m2, ..self.light.clone() };
+            let light = LightArgs { points: Some(quality.points_per_m2), ..self.light.clone() };
             self.feed = start_server(&self.scene, &light, self.next_group)?;
             self.light = light;
         }
@@ -252,7 +252,7 @@ pub(super) fn start_server(scene: &Arc<Scene>, light: &LightArgs, first_group: u
     let config = server_config(scene, light)?;
     let publish = PublisherConfig { first_group, ..config.publish };
     let config = ServerConfig { publish, ..config };
-    Ok(Feed::Live(Live::start(scene.clone(), config, light.hz, light.step.ray_budget)?))
+    Ok(Feed::Live(Live::start(scene.clone(), config, light.hz(), light.step.ray_budget)?))
 }
 
 fn viewer_config(quality: &Quality, format: wgpu::TextureFormat) -> ViewerConfig {

@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 
-use crate::args::{Method, Options, Radius, Size, StepArgs};
+use crate::args::{Method, Options, Preset, Radius, Size, StepArgs};
 
 /// Frame times lie on a grid of this rate, whatever the server's rate.
 pub(in crate::eval) const CLIENT_HZ: f64 = 60.0;
@@ -45,6 +45,8 @@ impl Settings {
             Method::Rtao { rays: whole(16) },
             Method::None,
         ];
+        let preset = options.preset;
+        let points = preset.map_or(if small { 256.0 } else { 512.0 }, Preset::points_per_m2);
         let settings = Settings {
             methods: distinct(options.methods.unwrap_or(default_methods)),
             paths: distinct(options.path.unwrap_or_default()),
@@ -52,16 +54,18 @@ impl Settings {
             frames: options.frames.unwrap_or(if small { 2 } else { 4 }),
             size: options.size.unwrap_or(Size { width: 480, height: 270 }),
             supersample,
-            points_per_m2: distinct(
-                options.points.unwrap_or_else(|| vec![if small { 256.0 } else { 512.0 }]),
-            ),
-            hz: distinct(options.hz.unwrap_or_else(|| vec![15.0])),
+            points_per_m2: distinct(options.points.unwrap_or_else(|| vec![points])),
+            hz: distinct(options.hz.unwrap_or_else(|| vec![preset.map_or(15.0, Preset::hz)])),
             reference_rays: options.reference_rays.unwrap_or(whole(if small { 128 } else { 512 })),
             radius: options.radius.unwrap_or(Radius::Metres(0.6)),
             point_rays: options.point_rays.unwrap_or(64),
             threshold: options.threshold.unwrap_or(4),
             seed: options.seed.unwrap_or(1),
-            step: StepArgs { ray_budget: options.ray_budget, rays_still: options.rays_still.unwrap_or(0) },
+            step: StepArgs {
+                ray_budget: options.ray_budget,
+                rays_still: options.rays_still.unwrap_or(0),
+                budget: options.budget.or(preset.map(Preset::budget)),
+            },
             hdr_flip: options.hdr_flip.unwrap_or(false),
         };
         settings.check()?;

@@ -171,7 +171,7 @@ impl Updater {
 
 impl Cluster {
     /// Where it is: its instance's box where its own is not kept up to date.
-    fn bounds_now<'a>(&'a self, instances: &'a [Aabb]) -> &'a Aabb {
+    pub(super) fn bounds_now<'a>(&'a self, instances: &'a [Aabb]) -> &'a Aabb {
         if self.moving { &instances[self.instance as usize] } else { self.bounds_world() }
     }
 

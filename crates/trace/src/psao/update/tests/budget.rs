@@ -9,7 +9,8 @@ use crate::psao::update::select::MOST_HEAD_START;
 
 /// Where x is at least `x`, and where it is less.
 fn halves(x: f32) -> [ConvexVolume; 2] {
-    [1.0, -1.0].map(|sign| ConvexVolume { planes: vec![Vec4::new(sign, 0.0, 0.0, -sign * x)] })
+    [1.0, -1.0]
+        .map(|sign| ConvexVolume { planes: vec![Vec4::new(sign, 0.0, 0.0, -sign * x)], eye_world: None })
 }
 
 fn budget(rays: u64) -> StepInput<'static> {
