@@ -117,6 +117,45 @@ fn a_server_short_of_rays_falls_behind_and_catches_up() {
 }
 
 #[test]
+fn a_server_short_of_bits_sends_no_more_in_any_second_and_catches_up() {
+    let mut config = config(4);
+    config.bits_per_s = Some(8_000);
+    let (mut short, mut free) = (start(&config), start(&ServerConfig { bits_per_s: None, ..config }));
+    let mut subscriber = Subscriber::new(Some(short.scene().hash().0), Limits::default());
+    subscriber.receive(&short.join().unwrap().unwrap().bytes).unwrap();
+    let (mut sent, mut wanted, mut most_held_back) = (Vec::new(), 0, 0);
+    let mut step = |short: &mut Server, tick: u32, time_s: f64| {
+        let report = short.step_at(time_s, f64::from(tick) / 20.0, &StepInput::default()).unwrap();
+        let bytes = report.frame.as_ref().map_or(0, |frame| frame.bytes.len());
+        if let Some(frame) = &report.frame {
+            assert_eq!(frame.kind, FrameKind::Delta);
+            subscriber.receive(&frame.bytes).unwrap();
+        }
+        assert!(subscriber.store() == Some(short.store()));
+        sent.push(bytes);
+        report
+    };
+    for tick in 1..=40 {
+        let time_s = f64::from(tick) / 20.0;
+        most_held_back = most_held_back.max(step(&mut short, tick, time_s).held_back);
+        wanted += free.step(time_s).unwrap().frame.map_or(0, |frame| frame.bytes.len());
+    }
+    assert!(most_held_back > 20, "{most_held_back}");
+    // The scene stands still, the clock does not.
+    let mut last = step(&mut short, 41, 2.0);
+    for tick in 42..400 {
+        last = step(&mut short, tick, 2.0);
+    }
+    assert!(last.frame.is_none() && last.held_back == 0, "{} held back", last.held_back);
+    let pairs = short.store().visibility().iter().zip(short.traced().visibility());
+    assert!(pairs.clone().all(|(a, b)| a.abs_diff(*b) <= 4));
+    let seconds: Vec<usize> = sent.windows(20).map(|second| second.iter().sum()).collect();
+    assert!(seconds.iter().all(|bytes| *bytes <= 1000), "{seconds:?}");
+    let moving: usize = sent[..40].iter().sum();
+    assert!(2 * moving < wanted && moving > 1000, "{moving} of {wanted} bytes");
+}
+
+#[test]
 fn subscribers_are_brought_up_to_date_by_one_snapshot() {
     let mut server = start(&config(4));
     let first = server.join().unwrap().unwrap();

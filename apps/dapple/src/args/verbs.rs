@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::{Args, Subcommand, ValueEnum};
 use dapple_metrics::PIXELS_PER_DEGREE;
 
@@ -53,7 +54,13 @@ Pictures belong together by name and follow one another as names do, frame-9 bef
 #[derive(Debug, Clone, Args)]
 pub(crate) struct JudgeArgs {
     /// Weights for LPIPS (SqueezeNet), a .safetensors file; without them it is not computed.
-    #[arg(long, value_name = "FILE", env = "DAPPLE_LPIPS_WEIGHTS")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        env = "DAPPLE_LPIPS_WEIGHTS",
+        // Of paths clap refuses the empty one, which a variable that is set to nothing would be.
+        value_parser = OsStringValueParser::new().map(PathBuf::from)
+    )]
     pub(crate) lpips_weights: Option<PathBuf>,
     /// Pixels a degree of visual angle, for FLIP, 1 to 1000.
     #[arg(long, value_name = "N", default_value_t = PIXELS_PER_DEGREE)]

@@ -188,3 +188,39 @@ proptest! {
         prop_assert!(ConvexVolume::default().touches(&around));
     }
 }
+
+#[test]
+fn errors_may_be_larger_far_away_and_larger_still_out_of_view() {
+    let (scene, pose) = stage();
+    let (_, updater) = start_at(&scene, &pose, UpdateParams::default(), 60.0);
+    let stretch = 16;
+    assert_eq!(updater.coarseness(&[], stretch), [], "without interest everything counts alike");
+    let positions = updater.positions_world(&scene, &pose);
+    let eye = Vec3::new(0.2, 1.5, 2.0);
+    let seen = ConvexVolume { eye_world: Some(eye), ..halves(2.0)[0].clone() };
+    let coarseness = updater.coarseness(std::slice::from_ref(&seen), stretch);
+    assert_eq!(coarseness.len(), positions.len().div_ceil(stretch));
+    let (mut in_view, mut out_of_view) = (0, 0);
+    for (points, coarse) in positions.chunks(stretch).zip(&coarseness) {
+        // Never more than for its nearest point, eight times as much where none is seen.
+        let places = || points.iter().flatten();
+        let nearest = places().map(|p| p.distance(eye)).fold(f32::INFINITY, f32::min);
+        if places().any(|p| seen.contains(*p)) {
+            in_view += 1;
+            assert!(*coarse <= nearest.max(1.5), "{coarse} at {nearest} m");
+        } else {
+            out_of_view += u32::from(*coarse > 4.0 * nearest);
+            assert!(*coarse <= 8.0 * nearest.max(1.5));
+        }
+        assert!(*coarse > 0.0);
+    }
+    assert!(in_view > 20 && out_of_view > 20, "{in_view} {out_of_view}");
+    // Who looks from elsewhere lowers it, and raises it nowhere.
+    let other = ConvexVolume { eye_world: Some(Vec3::new(4.0, 0.5, 2.0)), ..halves(2.0)[1].clone() };
+    let both = updater.coarseness(&[seen, other], stretch);
+    assert!(both.iter().zip(&coarseness).all(|(both, one)| both <= one));
+    assert!(both.iter().zip(&coarseness).any(|(both, one)| both < one));
+    // From no place, as with parallel rays, everything is as near.
+    let flat = updater.coarseness(&halves(2.0)[..1], stretch);
+    assert!(flat.iter().all(|c| *c == 1.0 || *c == 8.0));
+}
