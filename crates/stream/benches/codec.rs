@@ -5,7 +5,8 @@ mod cloud;
 
 use std::time::{Duration, Instant};
 
-use dapple_stream::{FrameHeader, Limits, Precision, Publisher, PublisherConfig, Subscriber};
+use dapple_store::points::PointStore;
+use dapple_stream::{Applied, FrameHeader, Limits, Precision, Publisher, PublisherConfig, Subscriber};
 
 fn main() {
     let store = cloud::hall(1, 200_000);
@@ -71,6 +72,47 @@ fn main() {
     let start = Instant::now();
     let none = publisher.publish(&store);
     println!("  unchanged: {} bytes in {:?}", none.map_or(0, |f| f.bytes.len()), start.elapsed());
+    println!("a stream of them, one after the other:");
+    for share in [0.1, 0.01, 0.001, 0.0001] {
+        stream(&store, config, share);
+    }
+}
+
+/// Decodes a stream that comes back to the same few states: the first round finds neighbours, the others know them.
+fn stream(store: &PointStore, config: PublisherConfig, share: f32) {
+    const ROUNDS: usize = 15;
+    let states: Vec<_> = (0..8).map(|seed| cloud::moved(store, seed + 20, share)).collect();
+    let mut publisher = Publisher::new([0; 32], config);
+    let mut subscriber = Subscriber::new(None, Limits::default());
+    subscriber.receive(&publisher.publish(store).expect("a first frame").bytes).expect("a sound frame");
+    let frames: Vec<Vec<_>> = (0..ROUNDS)
+        .map(|_| states.iter().map(|state| publisher.publish(state).expect("changes").bytes).collect())
+        .collect();
+    let mut times: Vec<(f64, usize, usize)> = frames
+        .iter()
+        .map(|round| {
+            let start = Instant::now();
+            let changed = round.iter().map(|frame| match subscriber.receive(frame) {
+                Ok(Applied::Changes(changes)) => changes.len(),
+                other => panic!("no delta: {other:?}"),
+            });
+            let changed: usize = changed.sum();
+            (
+                start.elapsed().as_nanos() as f64 / changed as f64,
+                changed,
+                round.iter().map(|frame| frame.len()).sum(),
+            )
+        })
+        .collect();
+    let first = times.remove(0);
+    times.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (time, changed, bytes) = times[times.len() / 2];
+    println!(
+        "  {:6} changes {:6.2} bits a change; ns a change: decoded in {:.0} at first, then in {time:.0}",
+        changed / states.len(),
+        bytes as f64 * 8.0 / changed as f64,
+        first.0,
+    );
 }
 
 /// Bytes of the layout and of the values of a snapshot (docs/wire.md).

@@ -4,6 +4,7 @@ mod delta;
 #[cfg(feature = "publish")]
 mod goal;
 mod near;
+mod nearest;
 mod snapshot;
 mod start;
 
