@@ -5,6 +5,7 @@ mod delta;
 mod goal;
 mod near;
 mod nearest;
+mod ranks;
 mod snapshot;
 mod start;
 

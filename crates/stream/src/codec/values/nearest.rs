@@ -37,8 +37,9 @@ pub(super) type Bounds = [[u32; 3]; 2];
 /// Whether two boxes have a place in common.
 #[inline]
 pub(super) fn touches(a: &Bounds, b: &Bounds) -> bool {
-    // No early end: one test that is seldom guessed right is better than six.
-    (0..3).fold(true, |touch, axis| touch & (a[0][axis] <= b[1][axis]) & (a[1][axis] >= b[0][axis]))
+    let along = |axis: usize| (a[0][axis] <= b[1][axis]) & (a[1][axis] >= b[0][axis]);
+    // No early end: one answer that is seldom guessed right is better than six.
+    along(0) & along(1) & along(2)
 }
 
 /// What may be near the points of a part of a block, the last first. Kept to be used again.
@@ -101,8 +102,8 @@ impl Candidates {
             };
             for (lane, &point) in points.iter().enumerate() {
                 let position = set.positions[point as usize];
-                for axis in 0..3 {
-                    let coordinate = position[axis] as f32;
+                for (axis, coordinate) in position.map(|coordinate| coordinate as f32).into_iter().enumerate()
+                {
                     chunk.positions[axis][lane] = coordinate;
                     chunk.bounds[0][axis] = chunk.bounds[0][axis].min(coordinate);
                     chunk.bounds[1][axis] = chunk.bounds[1][axis].max(coordinate);
@@ -121,22 +122,17 @@ impl Candidates {
             let group = start..points.min(start + GROUP);
             let first = start / CHUNK;
             let own = &self.chunks[first..group.end.div_ceil(CHUNK)];
-            let mut around = [[f32::INFINITY; 3], [0.0f32; 3]];
-            for axis in 0..3 {
-                for chunk in own {
-                    around[0][axis] = around[0][axis].min(chunk.bounds[0][axis]);
-                    around[1][axis] = around[1][axis].max(chunk.bounds[1][axis]);
-                }
-                around[0][axis] -= reach as f32;
-                around[1][axis] += reach as f32;
-            }
+            let low =
+                |axis: usize| own.iter().fold(f32::INFINITY, |low, chunk| low.min(chunk.bounds[0][axis]));
+            let high = |axis: usize| own.iter().fold(0f32, |high, chunk| high.max(chunk.bounds[1][axis]));
+            let low = [0, 1, 2].map(|axis| low(axis) - reach as f32);
+            let high = [0, 1, 2].map(|axis| high(axis) + reach as f32);
             let mut count = 0;
             for (at, chunk) in self.chunks.iter().enumerate().skip(first).take(MOST_CHUNKS) {
                 near[count] = at as u8;
-                let [low, high] = &chunk.bounds;
-                count += usize::from((0..3).fold(true, |touch, axis| {
-                    touch & (low[axis] <= around[1][axis]) & (high[axis] >= around[0][axis])
-                }));
+                let [least, most] = &chunk.bounds;
+                let along = |axis: usize| (least[axis] <= high[axis]) & (most[axis] >= low[axis]);
+                count += usize::from(along(0) & along(1) & along(2));
             }
             for own in group {
                 // The chunks of a group come first and all touch it.
