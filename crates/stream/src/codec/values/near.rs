@@ -78,6 +78,7 @@ impl Near {
             + size_of_val(&self.blocks.clusters[..])
             + size_of_val(&self.slots[..])
             + self.found.capacity() * size_of::<Back>()
+            + self.candidates.bytes()
     }
 }
 

@@ -70,6 +70,11 @@ impl Default for Candidates {
 }
 
 impl Candidates {
+    /// Bytes held, by capacity: at most some 30,000.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&self.kept[..]) + self.chunks.capacity() * size_of::<Chunk>()
+    }
+
     pub(super) fn clear(&mut self) {
         self.chunks.clear();
         self.count = 0;
