@@ -5,7 +5,8 @@ mod cloud;
 
 use std::time::{Duration, Instant};
 
-use dapple_stream::{FrameHeader, Limits, Precision, Publisher, PublisherConfig, Subscriber};
+use dapple_store::points::PointStore;
+use dapple_stream::{Applied, FrameHeader, Limits, Precision, Publisher, PublisherConfig, Subscriber};
 
 fn main() {
     let store = cloud::hall(1, 200_000);
@@ -71,6 +72,45 @@ fn main() {
     let start = Instant::now();
     let none = publisher.publish(&store);
     println!("  unchanged: {} bytes in {:?}", none.map_or(0, |f| f.bytes.len()), start.elapsed());
+    println!("a stream of them, one after the other:");
+    for share in [0.1, 0.01, 0.001, 0.0001] {
+        stream(&store, config, share);
+    }
+}
+
+/// Decodes a stream that comes back to the same few states: the first round finds neighbours, the others know them.
+fn stream(store: &PointStore, config: PublisherConfig, share: f32) {
+    const STATES: usize = 8;
+    const ROUNDS: usize = 15;
+    let states: Vec<_> = (0..STATES as u64).map(|seed| cloud::moved(store, seed + 20, share)).collect();
+    let mut publisher = Publisher::new([0; 32], config);
+    let mut subscriber = Subscriber::new(None, Limits::default());
+    subscriber.receive(&publisher.publish(store).expect("a first frame").bytes).expect("a sound frame");
+    let rounds = states.iter().cycle().take(STATES * ROUNDS);
+    let frames: Vec<_> = rounds.map(|state| publisher.publish(state).expect("changes").bytes).collect();
+    // By frame, which is short enough not to be interrupted: the median is of those that were not.
+    let (mut times, mut changed, mut bytes) = (Vec::new(), 0, 0);
+    for frame in &frames {
+        let start = Instant::now();
+        let applied = subscriber.receive(frame);
+        let elapsed = start.elapsed().as_nanos() as f64;
+        let Ok(Applied::Changes(changes)) = applied else { panic!("no delta: {applied:?}") };
+        times.push(elapsed / changes.len() as f64);
+        changed += changes.len();
+        bytes += frame.len();
+    }
+    let (first, warm) = times.split_at_mut(STATES);
+    let median = |times: &mut [f64]| {
+        times.sort_by(f64::total_cmp);
+        times[times.len() / 2]
+    };
+    println!(
+        "  {:6} changes {:6.2} bits a change; ns a change: decoded in {:.0} at first, then in {:.0}",
+        changed / frames.len(),
+        bytes as f64 * 8.0 / changed as f64,
+        median(first),
+        median(warm),
+    );
 }
 
 /// Bytes of the layout and of the values of a snapshot (docs/wire.md).

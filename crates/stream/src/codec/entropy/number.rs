@@ -26,6 +26,7 @@ impl Number {
     }
 
     /// Codes `value`, which is at most `most`; `most` is below 263. Returns what was coded, never more than `most`.
+    #[inline(always)]
     pub(crate) fn code<C: Coder>(&mut self, coder: &mut C, value: u32, most: u32) -> u32 {
         for (at, chance) in (0u32..).zip(&mut self.more) {
             if at == most || !coder.bit(chance, value > at) {

@@ -17,10 +17,17 @@ const QUICK: u32 = 4;
 const SLOW: u32 = 7;
 
 /// The range is widened below this.
+#[cfg(feature = "publish")]
 const LEAST_RANGE: u32 = 1 << 24;
 
 /// Bytes that a reader is ahead of a writer.
 const AHEAD: usize = 4;
+
+/// Most bits that one choice uses up: a range is at least 2²⁴ before it and 2⁸ after it.
+const MOST_USED: u32 = 16;
+
+/// Bits that a reader takes at once when it has few.
+const TAKEN: u32 = 24;
 
 impl Chance {
     /// As likely as not.
@@ -37,20 +44,22 @@ impl Chance {
         ((u32::from(self.quick) + u32::from(self.slow)) >> 1).max(1)
     }
 
-    #[inline]
-    fn learn(&mut self, one: bool) {
-        for (estimate, rate) in [(&mut self.quick, QUICK), (&mut self.slow, SLOW)] {
-            if one {
-                *estimate += (u16::MAX - *estimate) >> rate;
-            } else {
-                *estimate -= *estimate >> rate;
-            }
-        }
+    #[inline(always)]
+    fn learn_one(&mut self) {
+        self.quick += (u16::MAX - self.quick) >> QUICK;
+        self.slow += (u16::MAX - self.slow) >> SLOW;
+    }
+
+    #[inline(always)]
+    fn learn_zero(&mut self) {
+        self.quick -= self.quick >> QUICK;
+        self.slow -= self.slow >> SLOW;
     }
 }
 
-/// One end of a coded stream of choices.
-pub(crate) trait Coder {
+/// One end of a coded stream of choices. The default is one without bytes; it is left in the place of a coder that is moved
+/// into a function's own variables, where it can be kept in registers.
+pub(crate) trait Coder: Default {
     /// Codes one choice and learns from it. A writer returns `one`; a reader ignores it and returns what it read.
     fn bit(&mut self, chance: &mut Chance, one: bool) -> bool;
 
@@ -127,17 +136,25 @@ impl Writer {
 }
 
 #[cfg(feature = "publish")]
+impl Default for Writer {
+    fn default() -> Writer {
+        Writer::new(Vec::new())
+    }
+}
+
+#[cfg(feature = "publish")]
 impl Coder for Writer {
     #[inline]
     fn bit(&mut self, chance: &mut Chance, one: bool) -> bool {
         let bound = (self.range >> 16) * chance.of_one();
         if one {
             self.range = bound;
+            chance.learn_one();
         } else {
             self.low += u64::from(bound);
             self.range -= bound;
+            chance.learn_zero();
         }
-        chance.learn(one);
         while self.range < LEAST_RANGE {
             self.range <<= 8;
             self.shift();
@@ -154,54 +171,95 @@ impl Coder for Writer {
 #[derive(Clone, Debug)]
 pub(crate) struct Reader<'a> {
     range: u32,
-    code: u32,
+    /// What the range is compared with in the high 32 bits, then the `ahead` bits that follow it, then zeros.
+    window: u64,
+    ahead: u32,
     bytes: &'a [u8],
-    /// Bytes that were asked for, also beyond the end.
-    read: usize,
+    /// Bytes that went into the window, also beyond the end.
+    taken: usize,
 }
 
 impl<'a> Reader<'a> {
     /// Reads what a writer made: all of `bytes`.
     pub(crate) fn new(bytes: &'a [u8]) -> Reader<'a> {
-        let mut reader = Reader { range: u32::MAX, code: 0, bytes, read: 0 };
-        for _ in 0..AHEAD {
-            reader.shift();
-        }
+        let window =
+            (0..AHEAD).fold(0, |code, at| code << 8 | u64::from(bytes.get(at).copied().unwrap_or(0)));
+        let mut reader = Reader { range: u32::MAX, window: window << 32, ahead: 0, bytes, taken: AHEAD };
+        reader.take();
         reader
     }
 
-    fn shift(&mut self) {
-        self.code = self.code << 8 | u32::from(self.bytes.get(self.read).copied().unwrap_or(0));
-        self.read += 1;
+    /// Takes [`TAKEN`] bits more; there are fewer than [`MOST_USED`], so there is room. Beyond the end all are 0.
+    #[inline(always)]
+    fn take(&mut self) {
+        let next = self.bytes.get(self.taken..).and_then(|rest| rest.first_chunk());
+        let next =
+            next.map_or_else(|| last(self.bytes, self.taken), |next: &[u8; 4]| u32::from_be_bytes(*next));
+        self.window |= u64::from(next >> (u32::BITS - TAKEN)) << (u32::BITS - TAKEN - self.ahead);
+        self.ahead += TAKEN;
+        self.taken += TAKEN as usize / 8;
+    }
+
+    /// Makes the range 2²⁴ at least, by whole bytes.
+    #[inline(always)]
+    fn widen(&mut self) {
+        // Without a branch: when they are due is as hard to guess as the choices.
+        let used = self.range.leading_zeros() & !7;
+        self.range <<= used;
+        self.window <<= used;
+        self.ahead -= used;
+        if self.ahead < MOST_USED {
+            self.take();
+        }
+    }
+
+    /// Bytes that were asked for, also beyond the end.
+    fn read(&self) -> usize {
+        self.taken - self.ahead as usize / 8
     }
 
     /// Whether just these bytes were needed.
     pub(crate) fn is_complete(&self) -> bool {
-        self.read >= self.bytes.len() && !self.is_exhausted()
+        self.read() >= self.bytes.len() && !self.is_exhausted()
+    }
+}
+
+/// Four bytes from `at` on, the first highest, where there are not as many any more.
+#[cold]
+fn last(bytes: &[u8], at: usize) -> u32 {
+    (at..at + 4).fold(0, |next, at| next << 8 | u32::from(bytes.get(at).copied().unwrap_or(0)))
+}
+
+impl Default for Reader<'_> {
+    #[inline]
+    fn default() -> Self {
+        Reader { range: u32::MAX, window: 0, ahead: 0, bytes: &[], taken: 0 }
     }
 }
 
 impl Coder for Reader<'_> {
-    #[inline]
+    #[inline(always)]
     fn bit(&mut self, chance: &mut Chance, _: bool) -> bool {
         let bound = (self.range >> 16) * chance.of_one();
-        let one = self.code < bound;
-        if one {
+        let high = u64::from(bound) << 32;
+        // All that follows from it is done on either side, so that a processor guesses once for a choice.
+        if self.window < high {
             self.range = bound;
+            chance.learn_one();
+            self.widen();
+            true
         } else {
-            self.code -= bound;
+            self.window -= high;
             self.range -= bound;
+            chance.learn_zero();
+            self.widen();
+            false
         }
-        chance.learn(one);
-        while self.range < LEAST_RANGE {
-            self.range <<= 8;
-            self.shift();
-        }
-        one
     }
 
+    #[inline]
     fn is_exhausted(&self) -> bool {
-        self.read > self.bytes.len() + AHEAD
+        self.read() > self.bytes.len() + AHEAD
     }
 }
 
@@ -243,9 +301,40 @@ mod tests {
             for &(at, one) in &choices {
                 let share = f64::from(chances[at].of_one()) / 65536.0;
                 bits -= (if one { share } else { 1.0 - share }).log2();
-                chances[at].learn(one);
+                if one { chances[at].learn_one() } else { chances[at].learn_zero() }
             }
             prop_assert!(bytes.len() as f64 <= bits * 1.002 / 8.0 + 2.0, "{} bytes for {bits} bits", bytes.len());
+        }
+
+        #[test]
+        fn any_bytes_are_read_as_byte_by_byte(bytes in prop::collection::vec(any::<u8>(), 0..60)) {
+            let mut reader = Reader::new(&bytes);
+            let mut rest = bytes.iter().copied().chain(std::iter::repeat(0)).map(u32::from);
+            let (mut range, mut code, mut read) = (u32::MAX, 0u32, 0);
+            for _ in 0..4 {
+                code = code << 8 | rest.next().unwrap();
+                read += 1;
+            }
+            let (mut ours, mut chances) = ([Chance::EVEN; 4], [Chance::EVEN; 4]);
+            for at in 0..400 {
+                let chance = &mut chances[at % 4];
+                let bound = (range >> 16) * chance.of_one();
+                let one = code < bound;
+                if one {
+                    range = bound;
+                    chance.learn_one();
+                } else {
+                    (code, range) = (code - bound, range - bound);
+                    chance.learn_zero();
+                }
+                while range < 1 << 24 {
+                    (range, code) = (range << 8, code << 8 | rest.next().unwrap());
+                    read += 1;
+                }
+                prop_assert_eq!(reader.bit(&mut ours[at % 4], !one), one);
+                prop_assert_eq!(reader.read(), read);
+                prop_assert_eq!(reader.is_exhausted(), read > bytes.len() + 4);
+            }
         }
 
         #[test]

@@ -7,6 +7,7 @@ use std::ops::Range;
 use dapple_store::points::PointLayout;
 
 use super::near::{BLOCK, Near, SHARES};
+use super::ranks::{LEAF_RANKS, Of, gap_rank, rank};
 use super::start::Chances;
 use crate::codec::entropy::{Chance, Coder};
 
@@ -21,6 +22,9 @@ pub(crate) const MOST_FOLLOW: u8 = 128;
 
 /// Largest size of a number that neighbours still tell apart.
 const MOST_SIZE: i32 = 15;
+
+/// Bits for a sum of sizes, 8ths: at most 8 × [`MOST_SIZE`]. What is above is a sum of changes; one of either fits 16 bits.
+const SIZE_BITS: u32 = 7;
 
 /// A point whose visibility changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,7 +61,7 @@ pub(crate) struct Scratch {
     /// Where in `cells` a block begins, in blocks; 0 is a block of zeros.
     slots: Vec<u32>,
     used: Vec<u32>,
-    /// Per point: 16 × its change + the size of its number.
+    /// Per point: its change × 2^[`SIZE_BITS`] + the size of its number.
     cells: Vec<[i16; BLOCK]>,
 }
 
@@ -78,7 +82,7 @@ impl Scratch {
     }
 
     fn cell(&self, point: usize) -> i32 {
-        i32::from(self.cells[self.slots[point / BLOCK] as usize][point % BLOCK])
+        cell(&self.slots, &self.cells, point)
     }
 
     /// Bytes held, by capacity.
@@ -87,9 +91,10 @@ impl Scratch {
     }
 }
 
-/// Where `value` stands among ascending `limits`: how many it reaches.
-fn rank<const N: usize>(value: i32, limits: [i32; N]) -> usize {
-    limits.iter().map(|limit| usize::from(value >= *limit)).sum()
+/// What is remembered of a point.
+#[inline]
+fn cell(slots: &[u32], cells: &[[i16; BLOCK]], point: usize) -> i32 {
+    i32::from(cells[slots[point / BLOCK] as usize][point % BLOCK])
 }
 
 /// Codes the changes of `values`. Gives them in order of point, or nothing if the bytes of a reader ended too early.
@@ -175,72 +180,76 @@ impl<C: Coder, G: Guide> Walk<'_, C, G> {
         let mut most = 0;
         for point in (start..(start + LEAF).min(self.values.len())).step_by(4) {
             for back in back[point % BLOCK] {
-                most = most.max((self.scratch.cell(point - usize::from(back)) >> 4).abs());
+                most = most.max((self.scratch.cell(point - usize::from(back)) >> SIZE_BITS).abs());
             }
         }
-        rank(most, [1, 4, 8, 12, 16, 32, 64]) * 4 + (self.flags[level] & 3)
+        rank(most, &LEAF_RANKS) * 4 + (self.flags[level] & 3)
     }
 
     /// Codes all points of a smallest stretch.
     fn code_leaf(&mut self, points: Range<usize>) {
         let block = points.start / BLOCK;
-        let slot = self.scratch.slots[block] as usize;
-        let follow = i32::from(self.scale.follow);
         let back = self.near.of_block(self.layout, block);
+        let (slots, cells) = (&self.scratch.slots[..], &mut self.scratch.cells[..]);
+        let slot = slots[block] as usize;
+        let (follow, step) = (i32::from(self.scale.follow), i32::from(self.scale.step));
+        // Of what is below 256, times this is divided by the step, in 65,536ths.
+        let per_step = (1 << 16) / step + 1;
+        let (mut changes, mut count) = ([ValueChange { point: 0, old: 0, new: 0 }; LEAF], 0);
+        // A variable of its own, which stays in registers.
+        let mut coder = std::mem::take(self.coder);
         for point in points {
             let back = back[point % BLOCK].map(|back| point - usize::from(back));
-            let (mut drift, mut size) = (0, 0);
-            for (share, neighbour) in SHARES.iter().zip(back) {
-                let cell = self.scratch.cell(neighbour);
-                drift += share * (cell >> 4);
-                size += share * (cell & 15);
-            }
+            let around = back.map(|neighbour| cell(slots, cells, neighbour));
+            // Both sums in one: the lower never reaches into the upper.
+            let sums: i32 = SHARES.iter().zip(around).map(|(share, cell)| share * cell).sum();
+            let (drift, size) = (sums >> SIZE_BITS, sums & ((1 << SIZE_BITS) - 1));
             let old = i32::from(self.values[point]);
             let expected = (old + ((drift * follow + 256) >> 9)).clamp(0, 255);
             let wanted = self.guide.choose(point, old, expected, drift);
-            let number = {
-                let scratch = &*self.scratch;
-                // How far the point was from its neighbours, in 8ths, as they are now.
-                let gap = || {
-                    let now = |j: usize| i32::from(self.values[j]) + (scratch.cell(j) >> 4);
-                    SHARES.iter().zip(back).map(|(share, j)| share * (now(j) - old)).sum::<i32>()
-                };
-                let around = Around { drift, size, expected, step: i32::from(self.scale.step) };
-                self.chances.code_number(self.coder, &around, gap, wanted)
+            // How far the point was from its neighbours, in 8ths, as they are now.
+            let gap = || {
+                let now = |j: usize, cell: i32| i32::from(self.values[j]) + (cell >> SIZE_BITS);
+                let off = |((share, j), cell): ((&i32, usize), i32)| share * (now(j, cell) - old);
+                SHARES.iter().zip(back).zip(around).map(off).sum::<i32>()
             };
-            let new = (expected + number * i32::from(self.scale.step)).clamp(0, 255);
-            self.scratch.cells[slot][point % BLOCK] = ((new - old) << 4 | number.abs().min(MOST_SIZE)) as i16;
-            if new != old {
-                self.changes.push(ValueChange { point: point as u32, old: old as u8, new: new as u8 });
-            }
+            let known = Known { drift, of: Of::point(size, drift), expected, per_step };
+            let number = self.chances.code_number(&mut coder, &known, gap, wanted);
+            let new = (expected + number * step).clamp(0, 255);
+            cells[slot][point % BLOCK] = ((new - old) << SIZE_BITS | number.abs().min(MOST_SIZE)) as i16;
+            // Written always, kept if it is a change.
+            changes[count % LEAF] = ValueChange { point: point as u32, old: old as u8, new: new as u8 };
+            count += usize::from(new != old);
         }
+        self.changes.extend_from_slice(&changes[..count]);
+        *self.coder = coder;
     }
 }
 
 /// What is known of a point before its number is.
-struct Around {
+struct Known {
     /// How much its neighbours changed, 8ths.
     drift: i32,
-    /// The size of their numbers, 8ths.
-    size: i32,
+    /// Where that, and the size of their numbers, stands.
+    of: Of,
     expected: i32,
-    step: i32,
+    /// 65,536 / step, rounded up.
+    per_step: i32,
 }
 
 impl Chances {
+    #[inline(always)]
     fn code_number<C: Coder>(
         &mut self,
         coder: &mut C,
-        around: &Around,
+        known: &Known,
         gap: impl FnOnce() -> i32,
         wanted: i32,
     ) -> i32 {
-        let &Around { drift, size, expected, step } = around;
+        let &Known { drift, of, expected, per_step } = known;
         let (low, high) = (expected <= 5, expected >= 250);
         let edge = if high { 2 } else { usize::from(low) };
-        let strength = drift.abs();
-        let zero = (rank(size, [1, 4, 8, 14, 28]) * 6 + rank(strength, [1, 24, 64, 128, 256])) * 3 + edge;
-        if !coder.bit(&mut self.some[zero], wanted != 0) {
+        if !coder.bit(&mut self.some[of.some() + edge], wanted != 0) {
             return 0;
         }
         // Told apart by whether it goes on as the neighbours do, or else towards them.
@@ -249,15 +258,13 @@ impl Chances {
         let gap = if down { -gap } else { gap };
         let (closed, open) = if down { (low, high) } else { (high, low) };
         let edge = if closed { 2 } else { usize::from(open) };
-        let sign =
-            (rank(gap, [-128, -48, -16, 16, 48, 128, 320]) * 5 + rank(strength, [1, 24, 64, 160])) * 3 + edge;
+        let sign = gap_rank(gap) * 15 + of.against() + edge;
         let falls = coder.bit(&mut self.against[sign], (wanted < 0) != down) != down;
         let room = if falls { expected } else { 255 - expected };
         // More than brings the value to its end would say nothing.
-        let most = (room.max(1) - 1) / step;
-        let kind = rank(size, [1, 8, 16, 32]) * 5 + rank(strength, [1, 32, 96, 224]);
-        let number =
-            1 + self.size[kind].code(coder, wanted.unsigned_abs().saturating_sub(1), most as u32) as i32;
+        let most = ((room.max(1) - 1) * per_step) >> 16;
+        let sizes = &mut self.size[of.size()];
+        let number = 1 + sizes.code(coder, wanted.unsigned_abs().saturating_sub(1), most as u32) as i32;
         if falls { -number } else { number }
     }
 }

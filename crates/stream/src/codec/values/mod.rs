@@ -4,6 +4,8 @@ mod delta;
 #[cfg(feature = "publish")]
 mod goal;
 mod near;
+mod nearest;
+mod ranks;
 mod snapshot;
 mod start;
 

@@ -1,8 +1,10 @@
 //! Which points are near a point and coded before it: what its value is foretold from. Whole numbers throughout.
 
-use dapple_store::points::{PackedNormal, PointLayout};
+use std::ops::Range;
 
-use crate::codec::plane::direction;
+use dapple_store::points::{PointLayout, PointSet};
+
+use super::nearest::{BLOCKS_SEARCHED, Bounds, Candidates, MOST_BACK, touches};
 
 /// Points of a block: they are asked for together.
 pub(crate) const BLOCK: usize = 64;
@@ -16,51 +18,50 @@ pub(crate) const SHARES: [i32; NEIGHBOURS] = [3, 2, 2, 1];
 /// How far neighbours may be, in 2 to the power of the layout's local bits: about the distance of points.
 const REACH: u32 = 2;
 
-/// Most blocks that neighbours are looked for in.
-const BLOCKS_SEARCHED: usize = 12;
-
-/// How far a neighbour may lie back in the order of points.
-const MOST_BACK: usize = u16::MAX as usize;
-
-/// How much farther points with other normals count: as this over 4096 for each squared step between them.
-const ALIKE: u64 = 4096;
+/// Blocks whose boxes lie in one larger box.
+const CLUSTER: usize = 16;
 
 /// How many points back each neighbour is, for each point of a block. 0: there is none.
 pub(crate) type Back = [[u16; NEIGHBOURS]; BLOCK];
 
 /// Neighbours, found when they are first asked for, block by block.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct Near {
-    /// How far neighbours may be, in steps of integer coordinates.
-    reach: u32,
-    /// Least and largest coordinates of each block.
-    boxes: Vec<[[u32; 3]; 2]>,
+    blocks: Blocks,
     /// Where in `found` a block's neighbours are, + 1; 0 while nobody has asked.
     slots: Vec<u32>,
     found: Vec<Back>,
+    candidates: Candidates,
+}
+
+/// Where the blocks of a layout lie.
+#[derive(Clone, Debug)]
+pub(super) struct Blocks {
+    /// How far neighbours may be, in steps of integer coordinates.
+    reach: u32,
+    /// Least and largest coordinates of each block.
+    boxes: Vec<Bounds>,
+    /// The same of each [`CLUSTER`] of blocks.
+    clusters: Vec<Bounds>,
 }
 
 impl Near {
     /// Nothing is found yet. `local_bits` are the layout's: 2 to their power is about the distance of points.
     pub(crate) fn new(layout: &PointLayout, local_bits: u32) -> Near {
-        let mut boxes = vec![[[u32::MAX; 3], [0; 3]]; layout.len().div_ceil(BLOCK)];
-        for set in layout.sets() {
-            for (point, position) in (set.first as usize..).zip(&set.positions) {
-                let [low, high] = &mut boxes[point / BLOCK];
-                for axis in 0..3 {
-                    low[axis] = low[axis].min(position[axis]);
-                    high[axis] = high[axis].max(position[axis]);
-                }
-            }
-        }
-        let slots = vec![0; boxes.len()];
-        Near { reach: REACH << local_bits, boxes, slots, found: Vec::new() }
+        let blocks = Blocks::new(layout, local_bits);
+        let slots = vec![0; blocks.boxes.len()];
+        Near { blocks, slots, found: Vec::new(), candidates: Candidates::default() }
+    }
+
+    /// Where the blocks lie, to find neighbours without keeping them.
+    pub(super) fn blocks(&self) -> &Blocks {
+        &self.blocks
     }
 
     /// The neighbours of a block's points, kept for the next time.
     pub(crate) fn of_block(&mut self, layout: &PointLayout, block: usize) -> &Back {
         if self.slots[block] == 0 {
-            let back = self.find(layout, block);
+            let back = self.blocks.find(layout, block, &mut self.candidates);
             if self.found.len() == self.found.capacity() {
                 // Sparingly: it stays.
                 self.found.reserve_exact((self.found.len() / 8).max(16));
@@ -73,13 +74,37 @@ impl Near {
 
     /// Bytes held, by capacity.
     pub(crate) fn bytes(&self) -> usize {
-        size_of_val(&self.boxes[..])
+        size_of_val(&self.blocks.boxes[..])
+            + size_of_val(&self.blocks.clusters[..])
             + size_of_val(&self.slots[..])
             + self.found.capacity() * size_of::<Back>()
+            + self.candidates.bytes()
+    }
+}
+
+impl Blocks {
+    fn new(layout: &PointLayout, local_bits: u32) -> Blocks {
+        let mut boxes = vec![[[u32::MAX; 3], [0; 3]]; layout.len().div_ceil(BLOCK)];
+        for set in layout.sets() {
+            for (point, position) in (set.first as usize..).zip(&set.positions) {
+                let [low, high] = &mut boxes[point / BLOCK];
+                for axis in 0..3 {
+                    low[axis] = low[axis].min(position[axis]);
+                    high[axis] = high[axis].max(position[axis]);
+                }
+            }
+        }
+        let join = |boxes: &[Bounds]| {
+            boxes.iter().fold([[u32::MAX; 3], [0; 3]], |[low, high], [l, h]| {
+                [[0, 1, 2].map(|axis| low[axis].min(l[axis])), [0, 1, 2].map(|axis| high[axis].max(h[axis]))]
+            })
+        };
+        let clusters = boxes.chunks(CLUSTER).map(join).collect();
+        Blocks { reach: REACH << local_bits, boxes, clusters }
     }
 
     /// The neighbours of a block's points.
-    pub(crate) fn find(&self, layout: &PointLayout, block: usize) -> Back {
+    pub(super) fn find(&self, layout: &PointLayout, block: usize, candidates: &mut Candidates) -> Back {
         let mut back = [[0; NEIGHBOURS]; BLOCK];
         let (start, end) = (block * BLOCK, ((block + 1) * BLOCK).min(layout.len()));
         let sets = layout.sets();
@@ -90,110 +115,48 @@ impl Near {
             if part.is_empty() {
                 continue;
             }
-            let candidates = self.candidates(set_start, &part, &set.positions, &set.normals);
-            for point in part {
-                let at = point - set_start;
-                let own = Candidate::new(point, set.positions[at], set.normals[at]);
-                back[point - start] = own.nearest(&candidates, self.reach);
-            }
+            let points = part.len();
+            self.gather(set, part, candidates);
+            candidates.nearest(points, self.reach, |point, nearest| {
+                back[set_start + point as usize - start] = nearest;
+            });
         }
         back
     }
 
-    /// What may be near points `part` of a set, the last first.
-    fn candidates(
-        &self,
-        set_start: usize,
-        part: &std::ops::Range<usize>,
-        positions: &[[u32; 3]],
-        normals: &[PackedNormal],
-    ) -> Vec<Candidate> {
-        let own = &positions[part.start - set_start..part.end - set_start];
+    /// Finds what may be near points `part` of a set: these themselves first, the last of them at the beginning.
+    fn gather(&self, set: &PointSet, part: Range<usize>, candidates: &mut Candidates) {
+        let set_start = set.first as usize;
         let mut around = [[u32::MAX; 3], [0; 3]];
-        for axis in 0..3 {
-            let along = || own.iter().map(|position| position[axis]);
-            around[0][axis] = along().min().unwrap_or(0).saturating_sub(self.reach);
-            around[1][axis] = along().max().unwrap_or(0) + self.reach;
+        for position in &set.positions[part.start - set_start..part.end - set_start] {
+            for axis in 0..3 {
+                around[0][axis] = around[0][axis].min(position[axis]);
+                around[1][axis] = around[1][axis].max(position[axis]);
+            }
         }
-        let block = part.start / BLOCK;
+        around[0] = around[0].map(|low| low.saturating_sub(self.reach));
+        around[1] = around[1].map(|high| high + self.reach);
         let oldest = (part.end.saturating_sub(MOST_BACK).max(set_start)) / BLOCK;
-        let touches = |of: &[[u32; 3]; 2]| {
-            (0..3).all(|axis| of[0][axis] <= around[1][axis] && of[1][axis] >= around[0][axis])
-        };
-        let mut found = Vec::new();
-        for block in (oldest..=block).rev().filter(|b| touches(&self.boxes[*b])).take(BLOCKS_SEARCHED) {
-            for point in (set_start.max(block * BLOCK)..part.end.min((block + 1) * BLOCK)).rev() {
-                let position = positions[point - set_start];
-                if touches(&[position, position]) {
-                    found.push(Candidate::new(point, position, normals[point - set_start]));
-                }
-            }
+        let newest = part.start / BLOCK;
+        let clusters = (oldest / CLUSTER..=newest / CLUSTER).rev();
+        let blocks =
+            clusters.filter(|cluster| touches(&self.clusters[*cluster], &around)).flat_map(|cluster| {
+                (oldest.max(cluster * CLUSTER)..=newest.min(cluster * CLUSTER + CLUSTER - 1)).rev()
+            });
+        candidates.clear();
+        for block in blocks.filter(|block| touches(&self.boxes[*block], &around)).take(BLOCKS_SEARCHED) {
+            let points = set_start.max(block * BLOCK)..part.end.min((block + 1) * BLOCK);
+            candidates.add(&set.positions, points.start - set_start..points.end - set_start, &around);
         }
-        found
-    }
-}
-
-struct Candidate {
-    point: usize,
-    position: [i32; 3],
-    normal: [i32; 3],
-}
-
-impl Candidate {
-    fn new(point: usize, position: [u32; 3], normal: PackedNormal) -> Candidate {
-        let normal = direction(normal).map(|c| c as i32);
-        Candidate { point, position: position.map(|c| c as i32), normal }
-    }
-
-    /// How far the nearest of `candidates` are back that come before this one; the list is in order, the last first.
-    /// Where there are fewer than there should be, the nearest counts for them too.
-    fn nearest(&self, candidates: &[Candidate], reach: u32) -> [u16; NEIGHBOURS] {
-        let mut best = [(u64::from(reach) * u64::from(reach) + 1, 0u16); NEIGHBOURS];
-        let before = candidates.partition_point(|other| other.point >= self.point);
-        for other in &candidates[before..] {
-            let farthest = best[NEIGHBOURS - 1].0;
-            // Normals only make it farther.
-            let squared = self.squared_distance(other);
-            if squared >= farthest {
-                continue;
-            }
-            let distance = self.stretched(other, squared);
-            let back = self.point - other.point;
-            if distance >= farthest || back > MOST_BACK {
-                continue;
-            }
-            let mut at = NEIGHBOURS - 1;
-            while at > 0 && distance < best[at - 1].0 {
-                best[at] = best[at - 1];
-                at -= 1;
-            }
-            best[at] = (distance, back as u16);
-        }
-        let nearest = best[0].1;
-        best.map(|(_, back)| if back == 0 { nearest } else { back })
-    }
-
-    fn squared_distance(&self, other: &Candidate) -> u64 {
-        let step = |axis: usize| i64::from(self.position[axis] - other.position[axis]);
-        (step(0) * step(0) + step(1) * step(1) + step(2) * step(2)) as u64
-    }
-
-    /// A squared distance, larger the more the normals differ; endless where they are at right angles or more.
-    fn stretched(&self, other: &Candidate, squared: u64) -> u64 {
-        let (mut turned, mut facing) = (0u64, 0i32);
-        for axis in 0..3 {
-            let turn = u64::from(self.normal[axis].abs_diff(other.normal[axis]));
-            turned += turn * turn;
-            facing += self.normal[axis] * other.normal[axis];
-        }
-        if facing <= 0 { u64::MAX } else { squared * (ALIKE + turned) / ALIKE }
+        candidates.arrange(set);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dapple_store::points::{PointSet, morton_code};
+    use crate::codec::plane::direction;
+    use dapple_store::points::{PackedNormal, morton_code};
     use proptest::prelude::*;
 
     type Points = Vec<([u32; 3], [u8; 2])>;
@@ -216,33 +179,102 @@ mod tests {
         prop::collection::vec((prop::array::uniform3(0u32..60), normal), 0..150)
     }
 
+    /// As `docs/wire.md` has it; endless where the normals are at right angles or more.
+    fn distance(set: &PointSet, a: usize, b: usize) -> u64 {
+        let dot = |a: [i64; 3], b: [i64; 3]| (0..3).map(|axis| a[axis] * b[axis]).sum::<i64>();
+        let less = |a: [i64; 3], b: [i64; 3]| [0, 1, 2].map(|axis| a[axis] - b[axis]);
+        let [p, q] = [a, b].map(|point| set.positions[point].map(i64::from));
+        let [m, n] = [a, b].map(|point| direction(set.normals[point]));
+        let (step, turn) = (less(p, q), less(m, n));
+        if dot(m, n) > 0 { (dot(step, step) * (4096 + dot(turn, turn)) / 4096) as u64 } else { u64::MAX }
+    }
+
+    /// The neighbours of a block's points, word for word as `docs/wire.md` has them, and how many blocks are left out.
+    fn naive(layout: &PointLayout, reach: u64, block: usize) -> (Back, usize) {
+        let mut back = [[0; NEIGHBOURS]; BLOCK];
+        let mut left_out = 0;
+        let block_of = |set: &PointSet, at: usize| (set.first as usize + at) / BLOCK;
+        let bounds = |block: usize| {
+            let points = layout.sets().iter().flat_map(|set| {
+                (0..set.len()).filter(move |at| block_of(set, *at) == block).map(|at| set.positions[at])
+            });
+            let points: Vec<_> = points.collect();
+            [0, 1, 2].map(|axis| {
+                let along = || points.iter().map(|point| i64::from(point[axis]));
+                (along().min().unwrap(), along().max().unwrap())
+            })
+        };
+        for set in layout.sets() {
+            let own: Vec<usize> = (0..set.len()).filter(|at| block_of(set, *at) == block).collect();
+            let Some(&end) = own.last() else { continue };
+            let around = [0, 1, 2].map(|axis| {
+                let along = || own.iter().map(|at| i64::from(set.positions[*at][axis]));
+                (along().min().unwrap() - reach as i64, along().max().unwrap() + reach as i64)
+            });
+            let touches =
+                |of: &[(i64, i64); 3]| (0..3).all(|k| of[k].0 <= around[k].1 && of[k].1 >= around[k].0);
+            let oldest = block_of(set, (end + 1).saturating_sub(65_535));
+            let touching: Vec<usize> =
+                (oldest..=block).rev().filter(|other| touches(&bounds(*other))).collect();
+            let searched = &touching[..touching.len().min(12)];
+            left_out += touching.len() - searched.len();
+            for at in own {
+                let mut all: Vec<(u64, u16)> = (0..at)
+                    .filter(|other| searched.contains(&block_of(set, *other)))
+                    .filter(|other| touches(&set.positions[*other].map(|c| (c.into(), c.into()))))
+                    .map(|other| (distance(set, at, other), (at - other) as u16))
+                    .filter(|(distance, _)| *distance <= reach * reach)
+                    .collect();
+                all.sort_unstable();
+                let nearest = all.first().map_or(0, |first| first.1);
+                let found = |k: usize| all.get(k).map_or(nearest, |found| found.1);
+                back[set.first as usize + at - block * BLOCK] = [0, 1, 2, 3].map(found);
+            }
+        }
+        (back, left_out)
+    }
+
     proptest! {
         #[test]
         fn neighbours_are_the_nearest_before(sets in prop::collection::vec(points(), 1..4)) {
             let layout = layout(sets);
             let mut near = Near::new(&layout, 3);
-            for set in layout.sets() {
-                for at in 0..set.len() {
-                    let point = set.first as usize + at;
-                    let found = near.of_block(&layout, point / BLOCK)[point % BLOCK];
-                    let own = Candidate::new(0, set.positions[at], set.normals[at]);
-                    // So few points that all blocks are searched; the box around a block holds all that are within reach.
-                    let mut all: Vec<(u64, u16)> = (0..at)
-                        .map(|other| {
-                            let candidate = Candidate::new(0, set.positions[other], set.normals[other]);
-                            let squared = own.squared_distance(&candidate);
-                            (own.stretched(&candidate, squared), (at - other) as u16)
-                        })
-                        .filter(|(distance, _)| *distance <= 16 * 16)
-                        .collect();
-                    all.sort_unstable();
-                    let nearest = all.first().map_or(0, |first| first.1);
-                    let expected: Vec<u16> =
-                        (0..NEIGHBOURS).map(|k| all.get(k).map_or(nearest, |found| found.1)).collect();
-                    prop_assert_eq!(&found[..], &expected[..], "point {}", point);
+            for block in 0..layout.len().div_ceil(BLOCK) {
+                prop_assert_eq!(*near.of_block(&layout, block), naive(&layout, 16, block).0, "block {}", block);
+            }
+        }
+    }
+
+    #[test]
+    fn neighbours_in_a_crowd_are_those_of_the_last_blocks_that_touch() {
+        let mut random = 1u64;
+        let mut below = |n: u64| {
+            random = random.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(0x1405_7b7e_f767_814f);
+            (random >> 33) as u32 % n as u32
+        };
+        // Crowded or wide, a whole solid or nearly a plane, small or as large as it can be.
+        let mut left_out = 0;
+        for (size, height, shift) in
+            [(40, 40, 0), (300, 3, 0), (60, 2, 0), (120, 120, 0), (1 << 20, 9, 1 << 20)]
+        {
+            let mut some = |count| -> Points {
+                let mut point = || {
+                    let position = [below(size), below(height), below(size)].map(|c| c + shift);
+                    (position, [127 + (below(3) * 30) as u8, 127])
+                };
+                (0..count).map(|_| point()).collect()
+            };
+            let layout = layout(vec![some(1500), some(70), some(5), some(1000)]);
+            for local_bits in [1, 3, 8] {
+                let mut near = Near::new(&layout, local_bits);
+                for block in (0..layout.len().div_ceil(BLOCK)).rev() {
+                    let (expected, left) = naive(&layout, 2 << local_bits, block);
+                    assert_eq!(*near.of_block(&layout, block), expected, "size {size}, block {block}");
+                    left_out += left;
                 }
             }
         }
+        assert!(left_out > 0);
     }
 
     #[test]

@@ -6,6 +6,7 @@
 use dapple_store::points::PointLayout;
 
 use super::near::{BLOCK, Near, SHARES};
+use super::nearest::Candidates;
 use crate::codec::entropy::{Chance, Coder, Number};
 
 /// What is learned while values are coded.
@@ -52,8 +53,9 @@ pub(crate) fn code_values<C: Coder>(
         _ => palette.len() as i32 - 1,
     };
     let mut coded: Vec<u8> = Vec::new();
+    let mut candidates = Candidates::default();
     for start in (0..points).step_by(BLOCK) {
-        let back = near.find(layout, start / BLOCK);
+        let back = near.blocks().find(layout, start / BLOCK, &mut candidates);
         for point in start..points.min(start + BLOCK) {
             // Who has no neighbours takes the point before.
             let neighbours = back[point - start].map(|back| match back {
