@@ -63,6 +63,7 @@ Examples:
   dapple render --builtin atrium --time 4 --camera eye=2,1.7,5,target=0,1,0,fov=60 --method rtao -o truth.png
   dapple render city.glb --method psao --points 256 --radius auto --view visibility -o visibility.png
   dapple render --builtin atrium --view error -o error.png        psao against rtao, per pixel
+  dapple render --builtin atrium --method ssao --view visibility -o ssao.png
   dapple render room.glb --method rtao --view visibility -o visibility.exr";
 
 const QUALITY_EXAMPLES: &str = "\
@@ -247,6 +248,8 @@ pub(crate) enum RenderMethod {
     PsaoHat,
     /// Rays at every pixel: the truth.
     Rtao,
+    /// From the picture's depth and normals alone.
+    Ssao,
     /// No occlusion.
     None,
 }
@@ -287,6 +290,8 @@ pub(crate) enum Method {
     Rtao {
         rays: u32,
     },
+    /// From the picture's depth and normals alone.
+    Ssao,
     None,
 }
 
@@ -313,6 +318,7 @@ impl std::fmt::Display for Method {
             Method::PsaoPaperMls => write!(f, "psao-paper-mls"),
             Method::Sas { bias } => write!(f, "sas-{bias}"),
             Method::Rtao { rays } => write!(f, "rtao-{rays}"),
+            Method::Ssao => write!(f, "ssao"),
             Method::None => write!(f, "none"),
         }
     }
@@ -328,6 +334,7 @@ impl FromStr for Method {
             "psao-hat" => Ok(Method::PsaoHat { radius: 1.0 }),
             "psao-paper" => Ok(Method::PsaoPaper),
             "psao-paper-mls" => Ok(Method::PsaoPaperMls),
+            "ssao" => Ok(Method::Ssao),
             "none" => Ok(Method::None),
             "rtao" => Ok(Method::Rtao { rays: 16 }),
             _ => {
@@ -340,7 +347,7 @@ impl FromStr for Method {
                     (.., Some(bias @ 1..=1024)) => Ok(Method::Sas { bias }),
                     _ => Err(
                         "known methods: psao, psao-mls, psao-hat, psao-hat-F with its radius times F from 0.1 to 8, \
-                              psao-paper, psao-paper-mls, sas-B with B from 1 to 1024, rtao-R with R from 1 to 65536 (rtao-16), none"
+                              psao-paper, psao-paper-mls, sas-B with B from 1 to 1024, rtao-R with R from 1 to 65536 (rtao-16), ssao, none"
                             .into(),
                     ),
                 }
@@ -472,10 +479,11 @@ mod tests {
             assert!(text.parse::<Size>().is_err(), "{text}");
         }
         assert_eq!("rtao-512".parse(), Ok(Method::Rtao { rays: 512 }));
-        for method in [Method::PsaoPaper, Method::PsaoPaperMls, Method::PsaoHat { radius: 1.5 }] {
+        for method in [Method::PsaoPaper, Method::PsaoPaperMls, Method::PsaoHat { radius: 1.5 }, Method::Ssao]
+        {
             assert_eq!(method.to_string().parse(), Ok(method));
         }
-        for text in ["rtao-0", "rtao-x", "ssao", ""] {
+        for text in ["rtao-0", "rtao-x", "ssao-16", "magic", ""] {
             assert!(text.parse::<Method>().is_err(), "{text}");
         }
         assert_eq!("auto".parse(), Ok(Radius::Auto));

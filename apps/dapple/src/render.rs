@@ -8,6 +8,7 @@ use dapple_render::compose::{
 use dapple_render::compose::{view_normals, view_visibility};
 use dapple_render::image::{Rgb8Image, ToneMap};
 use dapple_render::psao::{Hat, Kernel};
+use dapple_render::ssao::{SsaoParams, estimate_visibility};
 use dapple_scene::PosedCamera;
 use dapple_scene::glam::Vec3;
 use dapple_server::{Progress, Server, ServerConfig};
@@ -40,7 +41,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<()> {
     let drawn = draw(scene, &camera, args.time, &params)?;
     drop(wheel);
     let (path, width, height) = (&args.output, drawn.gbuffer.width, drawn.gbuffer.height);
-    match numbers(args, &loaded, &drawn)? {
+    match numbers(args, &loaded, &drawn, &camera)? {
         Some(Numbers::Rgb(pixels)) => write_rgb(path, width, height, &pixels)?,
         Some(Numbers::Gray(values)) => write_gray(path, width, height, &values)?,
         None => write_png(path, width, height, &picture(args, &loaded, &drawn, &camera)?.pixels)?,
@@ -65,15 +66,15 @@ fn picture(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn, camera: &PosedCame
         View::Normal => view_normals(&drawn.gbuffer, &loaded.scene, &drawn.pose, NormalSpace::World),
         View::Points => points_view(args, loaded, drawn, camera)?,
         View::Beauty => {
-            let visibility = visibility(args, args.method, loaded, drawn)?;
+            let visibility = visibility(args, args.method, loaded, drawn, camera)?;
             drawn.compose(visibility.as_deref())?.to_rgb8(&ToneMap::default())
         }
         View::Visibility => {
-            let visibility = visibility(args, args.method, loaded, drawn)?;
+            let visibility = visibility(args, args.method, loaded, drawn, camera)?;
             view_visibility(&drawn.gbuffer, &visibility.unwrap_or_else(|| open(drawn)))?
         }
         View::Error => {
-            let [truth, test] = truth_and_test(args, loaded, drawn)?;
+            let [truth, test] = truth_and_test(args, loaded, drawn, camera)?;
             view_error(&truth.values, &test.values, &truth.coverage, ErrorKind::Signed)?
         }
     })
@@ -81,17 +82,23 @@ fn picture(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn, camera: &PosedCame
 
 /// The numbers behind the picture, if those are asked for: radiance, visibility (1 where there is nothing), normals in the
 /// world (0 where there is nothing), or how much visibility is too high.
-fn numbers(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn) -> Result<Option<Numbers>> {
+fn numbers(
+    args: &RenderArgs,
+    loaded: &Loaded,
+    drawn: &Drawn,
+    camera: &PosedCamera,
+) -> Result<Option<Numbers>> {
     if !is_exr(args) {
         return Ok(None);
     }
     Ok(Some(match args.view {
         View::Beauty => {
-            let visibility = visibility(args, args.method, loaded, drawn)?;
+            let visibility = visibility(args, args.method, loaded, drawn, camera)?;
             Numbers::Rgb(drawn.compose(visibility.as_deref())?.pixels)
         }
         View::Visibility => {
-            let visibility = visibility(args, args.method, loaded, drawn)?.unwrap_or_else(|| open(drawn));
+            let visibility =
+                visibility(args, args.method, loaded, drawn, camera)?.unwrap_or_else(|| open(drawn));
             Numbers::Gray(resolve_plane(&drawn.gbuffer, &visibility, 1.0)?.values.values)
         }
         View::Normal => {
@@ -105,7 +112,7 @@ fn numbers(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn) -> Result<Option<N
             Numbers::Rgb(drawn.gbuffer.map_pixels(|samples| sum(samples) * scale))
         }
         View::Error => {
-            let [truth, test] = truth_and_test(args, loaded, drawn)?;
+            let [truth, test] = truth_and_test(args, loaded, drawn, camera)?;
             let pairs = test.values.values.iter().zip(&truth.values.values);
             Numbers::Gray(pairs.map(|(test, truth)| test - truth).collect())
         }
@@ -115,9 +122,14 @@ fn numbers(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn) -> Result<Option<N
 }
 
 /// Visibility by rays at every pixel, and by the method.
-fn truth_and_test(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn) -> Result<[ResolvedPlane; 2]> {
-    let truth = visibility(args, RenderMethod::Rtao, loaded, drawn)?.unwrap_or_else(|| open(drawn));
-    let test = visibility(args, args.method, loaded, drawn)?.unwrap_or_else(|| open(drawn));
+fn truth_and_test(
+    args: &RenderArgs,
+    loaded: &Loaded,
+    drawn: &Drawn,
+    camera: &PosedCamera,
+) -> Result<[ResolvedPlane; 2]> {
+    let truth = visibility(args, RenderMethod::Rtao, loaded, drawn, camera)?.unwrap_or_else(|| open(drawn));
+    let test = visibility(args, args.method, loaded, drawn, camera)?.unwrap_or_else(|| open(drawn));
     Ok([resolve_plane(&drawn.gbuffer, &truth, 1.0)?, resolve_plane(&drawn.gbuffer, &test, 1.0)?])
 }
 
@@ -136,7 +148,7 @@ fn check(args: &RenderArgs) -> Result<()> {
         bail!("--time must be a finite number of seconds");
     }
     if args.view == View::Error && args.method == RenderMethod::Rtao {
-        bail!("--view error compares a method with rtao: choose --method psao, psao-hat or none");
+        bail!("--view error compares a method with rtao: choose --method psao, psao-hat, ssao or none");
     }
     Ok(())
 }
@@ -151,10 +163,12 @@ fn visibility(
     method: RenderMethod,
     loaded: &Loaded,
     drawn: &Drawn,
+    camera: &PosedCamera,
 ) -> Result<Option<Vec<f32>>> {
     let reconstruction = match method {
         RenderMethod::None => return Ok(None),
         RenderMethod::Rtao => return Ok(Some(traced(args, loaded, drawn)?)),
+        RenderMethod::Ssao => return Ok(Some(screen_space(args, loaded, drawn, camera)?)),
         RenderMethod::Psao => Reconstruction::Atlas,
         RenderMethod::PsaoHat => Kernel::Hat(Hat::default()).into(),
     };
@@ -176,6 +190,13 @@ fn traced(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn) -> Result<Vec<f32>>
         visibility[index] = value;
     }
     Ok(visibility)
+}
+
+fn screen_space(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn, camera: &PosedCamera) -> Result<Vec<f32>> {
+    let (radius_m, _) = source::resolve_radius(&loaded.scene, &args.visibility)?;
+    let screen = drawn.gbuffer.screen(&loaded.scene, &drawn.pose, camera)?;
+    let params = SsaoParams { radius_m, seed: args.visibility.seed, ..SsaoParams::default() };
+    Ok(estimate_visibility(&screen, &params)?)
 }
 
 /// A server brought to the picture's time, and a client that has joined it.

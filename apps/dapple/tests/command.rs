@@ -77,7 +77,7 @@ fn arguments_that_make_no_sense_are_named() {
         (&["--size", "640"], &["--size", "640", "1280x720"]),
         (&["--size", "0x5"], &["--size", "0x5"]),
         (&["--size", "8x8"], &["--size", "8x8"]),
-        (&["--methods", "psao,ssao"], &["--methods", "ssao", "psao-hat", "rtao-"]),
+        (&["--methods", "psao,magic"], &["--methods", "magic", "psao-hat", "rtao-", "ssao"]),
         (&["--methods", "rtao-0"], &["rtao-0"]),
         (&["--frames", "0"], &["--frames"]),
         (&["--seconds", "0"], &["--seconds"]),
@@ -112,10 +112,11 @@ fn arguments_that_make_no_sense_are_named() {
         (&["--points=-1"], &["points"]),
         (&["--points", "nan"], &["points"]),
         (&["--supersample", "0"], &["0"]),
-        (&["--method", "ssao"], &["ssao", "psao"]),
+        (&["--method", "magic"], &["magic", "psao", "ssao"]),
         (&["--view", "depth"], &["depth", "beauty"]),
         (&["--view", "error", "--method", "rtao"], &["--view error", "--method"]),
         (&["--view", "points", "--method", "rtao"], &["--view points", "--method"]),
+        (&["--view", "points", "--method", "ssao"], &["--view points", "--method"]),
     ] {
         fail(at, &[&["render", "lid.glb", "-o", "out.png"], arguments].concat(), names);
     }
@@ -152,7 +153,7 @@ fn every_view_of_every_method_is_rendered() {
     let common =
         ["--size", "48x32", "--rays", "16", "--points", "500", "--supersample", "1", "--camera", "above"];
     for view in ["beauty", "visibility", "normal", "error", "points"] {
-        for method in ["psao", "psao-hat", "rtao", "none"] {
+        for method in ["psao", "psao-hat", "rtao", "ssao", "none"] {
             // What these would show is refused; see the test of arguments.
             if view == "error" && method == "rtao" || view == "points" && !method.starts_with("psao") {
                 continue;
@@ -171,6 +172,7 @@ fn every_view_of_every_method_is_rendered() {
     let read = |name: &str| image::open(at.join(name)).unwrap().to_rgb8().into_raw();
     assert!(read("beauty-psao.png") != read("beauty-none.png"), "occlusion shows");
     assert!(read("visibility-psao.png") != read("visibility-none.png"));
+    assert!(read("visibility-ssao.png") != read("visibility-none.png"));
     assert!(read("normal-psao.png") == read("normal-none.png"), "normals have nothing to do with it");
 }
 

@@ -85,7 +85,7 @@ fn comparable(mut results: Value) -> Value {
 #[test]
 fn results_report_and_pictures_are_written() {
     let folder = TempDir::new().unwrap();
-    let arguments = ["--methods", "psao,psao-hat,rtao-4,none", "--hz", "5,15", "--out", "results"];
+    let arguments = ["--methods", "psao,psao-hat,rtao-4,ssao,none", "--hz", "5,15", "--out", "results"];
     let (out, results) = evaluate(folder.path(), &[&ATRIUM[..], &arguments].concat());
     let at = folder.path().join("results");
     let [case] = &results["cases"].as_array().unwrap()[..] else { panic!("one case") };
@@ -96,7 +96,7 @@ fn results_report_and_pictures_are_written() {
     assert!((0.01..0.2).contains(&case["truth"]["noise_rms"].as_f64().unwrap()), "16 rays are noisy");
     let rows = case["rows"].as_array().unwrap();
     let methods: Vec<&str> = rows.iter().map(|row| row["method"].as_str().unwrap()).collect();
-    assert_eq!(methods, ["psao", "psao", "psao-hat", "psao-hat", "rtao-4", "none"]);
+    assert_eq!(methods, ["psao", "psao", "psao-hat", "psao-hat", "rtao-4", "ssao", "none"]);
     for row in rows {
         let method = row["method"].as_str().unwrap();
         for column in ["visibility_psnr_db", "psnr_db", "ssim", "flip", "flicker"] {
@@ -126,7 +126,10 @@ fn results_report_and_pictures_are_written() {
         assert!(out.contains(method), "the table names {method}:\n{out}");
     }
     let psnr = |i: usize| rows[i]["visibility_psnr_db"]["value"].as_f64().unwrap();
-    assert!(psnr(0) > psnr(2) && psnr(2) > psnr(5), "least squares, the paper's kernel, no occlusion");
+    assert!(psnr(0) > psnr(2) && psnr(2) > psnr(6), "least squares, the paper's kernel, no occlusion");
+    assert!(psnr(5) > psnr(6), "screen space sees some of it");
+    assert_eq!((&rows[5]["rays"], &rows[5]["flicker"]["value"]), (&0.into(), &0.0.into()));
+    assert!(rows[5]["times"]["client_ms"].as_f64().unwrap() > 0.0);
     // Steps at 5 and at 15 Hz in half a second, and as many bits as their bytes say.
     for (row, steps) in [(0, 2), (1, 7)] {
         let bytes = rows[row]["step_bytes"].as_array().unwrap();

@@ -41,6 +41,16 @@ pub enum RenderError {
         /// What does not fit, and where.
         reason: String,
     },
+    /// A parameter of a method is out of its range.
+    #[error("{name} is {found}, must be {range}")]
+    Parameter {
+        /// Method and parameter.
+        name: &'static str,
+        /// What it is.
+        found: f64,
+        /// What it must be.
+        range: &'static str,
+    },
     /// A per-sample or per-pixel list is of the wrong length.
     #[error("{what} has {found} values where {expected} are needed: make it for the same G-buffer")]
     Length {

@@ -23,7 +23,7 @@ pub mod forward;
 pub mod gbuffer;
 pub mod image;
 pub mod psao;
-
 pub mod shade;
+pub mod ssao;
 
 pub use error::RenderError;

@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use anyhow::Result;
 use dapple_client::{Drawn, PictureParams, draw};
-use dapple_scene::{CameraPath, Scene};
+use dapple_scene::{CameraPath, PosedCamera, Scene};
 use dapple_trace::Tracer;
 
 use super::plan::{CLIENT_HZ, Settings};
@@ -171,7 +171,7 @@ impl<'a> Stage<'a> {
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Frame> {
         let scene = self.scene();
-        let camera = self.path.camera(scene, &scene.pose_undeformed(time_s));
+        let camera = self.camera(time_s);
         let drawn = draw(scene, &camera, time_s, &self.params)?;
         let request = Request {
             scene,
@@ -188,6 +188,16 @@ impl<'a> Stage<'a> {
         let times_s: Vec<f64> = before.filter(|t| *t >= 0.0).chain(watched_s.iter().copied()).collect();
         let still = still_map(scene, &drawn, &times_s, &self.moving, self.radius_m);
         Ok(Frame { time_s, drawn, truth, noise_mse: traced.noise_mse, watched_s: watched_s.to_vec(), still })
+    }
+
+    /// The camera that a picture of the path was drawn with.
+    pub(super) fn camera_at(&self, drawn: &Drawn) -> PosedCamera {
+        self.camera(drawn.pose.time)
+    }
+
+    fn camera(&self, time_s: f64) -> PosedCamera {
+        let scene = self.scene();
+        self.path.camera(scene, &scene.pose_undeformed(time_s))
     }
 
     /// The scene's tracer in a picture's pose.

@@ -4,6 +4,7 @@
 //! See the README in this folder for rules and precision.
 
 mod raster;
+mod screen;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -14,6 +15,7 @@ use rayon::prelude::*;
 
 use crate::{RenderError, projection, texture};
 pub(crate) use raster::{Sink, Triangle, View, barycentrics, draw};
+pub use screen::Screen;
 pub use surface::{LocalSurface, RestSurface, Surface};
 
 /// The instance index of a sample that sees the background.

@@ -82,6 +82,14 @@ impl GBuffer {
         })
     }
 
+    /// [`Surface::normal_world`] alone, cheaper; `None` as in [`GBuffer::surface`].
+    pub(super) fn normal_world(&self, scene: &Scene, pose: &Pose, sample_index: usize) -> Option<Vec3> {
+        let sample = self.samples.get(sample_index).filter(|s| s.is_covered())?;
+        let corners = world_triangle(scene, pose, sample.instance as usize, sample.triangle as usize)?;
+        let world_from_mesh = pose.instances.get(sample.instance as usize)?.world_from_mesh;
+        Some(Found::new(scene, sample)?.geometric_normal(&corners, Mat3::from(world_from_mesh.matrix3)))
+    }
+
     /// Rest position and normal of the surface that a sample sees; `None` as in [`GBuffer::surface`].
     pub fn surface_rest(&self, scene: &Scene, sample_index: usize) -> Option<RestSurface> {
         let sample = self.samples.get(sample_index).filter(|s| s.is_covered())?;

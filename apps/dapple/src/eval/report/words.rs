@@ -210,7 +210,7 @@ pub(super) fn headlines(results: &Results) -> String {
     let mut html = "<div class=\"scroll\"><table class=\"headlines\">\n<caption class=\"hidden\">The best method of each \
         case</caption>\n<thead><tr><th scope=\"col\">case</th><th scope=\"col\">best from points</th>\
         <th scope=\"col\">visibility</th><th scope=\"col\">updates</th><th scope=\"col\">next method</th>\
-        <th scope=\"col\">gain</th><th scope=\"col\">per-pixel rays</th><th scope=\"col\">no occlusion</th></tr></thead>\n<tbody>\n"
+        <th scope=\"col\">gain</th><th scope=\"col\">without a stream</th><th scope=\"col\">no occlusion</th></tr></thead>\n<tbody>\n"
         .to_owned();
     for case in &results.cases {
         let settings = columns::settings(case);

@@ -1,0 +1,123 @@
+//! What screen-space methods see of a G-buffer: distance and normal of each sample, in the camera's view space.
+
+use dapple_scene::{Pose, PosedCamera, Projection, Scene};
+use glam::{Mat3, Vec3};
+use rayon::prelude::*;
+
+use super::GBuffer;
+use crate::{RenderError, projection};
+
+/// Distance and normal of every sample, and the lens that brings samples back to places. View space: right-handed, x right,
+/// y up, the camera at the origin looks along −z; metres.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Screen {
+    columns: u32,
+    rows: u32,
+    lens: Lens,
+    distances_m: Vec<f32>,
+    normals_view: Vec<Vec3>,
+}
+
+/// How view space falls on the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Lens {
+    /// Half the picture's width and height: at distance 1 for a perspective, anywhere for a parallel camera.
+    half_extent: [f32; 2],
+    is_perspective: bool,
+}
+
+impl GBuffer {
+    /// Distances and normals for screen-space methods. `scene`, `pose` and `camera` must be those that were drawn.
+    ///
+    /// Normals are those of the posed triangles, as the ray-traced truth uses them, not interpolated or mapped ones.
+    ///
+    /// # Errors
+    /// A camera that cannot project.
+    pub fn screen(&self, scene: &Scene, pose: &Pose, camera: &PosedCamera) -> Result<Screen, RenderError> {
+        projection::clip_from_world(camera, self.width, self.height)?;
+        let lens = Lens::new(&camera.projection, f64::from(self.width) / f64::from(self.height));
+        // Normals go to view space by the transpose of the way back.
+        let view_from_world = Mat3::from(camera.world_from_view.matrix3).transpose();
+        let (distances_m, normals_view) = (0..self.samples.len())
+            .into_par_iter()
+            .with_min_len(1024)
+            .map(|i| match self.normal_world(scene, pose, i) {
+                None => (f32::INFINITY, Vec3::ZERO),
+                Some(normal) => (
+                    projection::view_distance(&camera.projection, self.samples[i].depth),
+                    (view_from_world * normal).normalize_or_zero(),
+                ),
+            })
+            .unzip();
+        Ok(Screen {
+            columns: self.width_samples(),
+            rows: self.height_samples(),
+            lens,
+            distances_m,
+            normals_view,
+        })
+    }
+}
+
+impl Lens {
+    fn new(projection: &Projection, aspect: f64) -> Lens {
+        let (half_height, is_perspective) = match *projection {
+            Projection::Perspective { yfov, .. } => (libm::tan(0.5 * f64::from(yfov)), true),
+            Projection::Orthographic { half_height, .. } => (f64::from(half_height), false),
+        };
+        Lens { half_extent: [(half_height * aspect) as f32, half_height as f32], is_perspective }
+    }
+}
+
+impl Screen {
+    /// Samples in a row.
+    pub fn columns(&self) -> u32 {
+        self.columns
+    }
+
+    /// Rows of samples.
+    pub fn rows(&self) -> u32 {
+        self.rows
+    }
+
+    /// Distance of each sample along the view axis, metres, row-major from the top; infinite for the background. Negative only
+    /// for a parallel camera whose near plane lies behind it.
+    pub fn distances_m(&self) -> &[f32] {
+        &self.distances_m
+    }
+
+    /// Unit normal of each sample in view space, on the viewer's side; zero for the background.
+    pub fn normals_view(&self) -> &[Vec3] {
+        &self.normals_view
+    }
+
+    /// The place that a sample sees, at the sample's centre; `None` for the background and for an index that is out of range.
+    pub fn position_view(&self, sample_index: usize) -> Option<Vec3> {
+        let distance = *self.distances_m.get(sample_index)?;
+        if !distance.is_finite() {
+            return None;
+        }
+        let (column, row) = (sample_index % self.columns as usize, sample_index / self.columns as usize);
+        let x = (2.0 * column as f32 + 1.0) / self.columns as f32 - 1.0;
+        let y = 1.0 - (2.0 * row as f32 + 1.0) / self.rows as f32;
+        let scale = if self.lens.is_perspective { distance } else { 1.0 };
+        let [half_width, half_height] = self.lens.half_extent;
+        Some(Vec3::new(x * half_width * scale, y * half_height * scale, -distance))
+    }
+
+    /// Index of the sample whose square of the picture a place falls on; `None` outside of the picture and behind the camera.
+    pub fn sample_at(&self, position_view: Vec3) -> Option<usize> {
+        let distance = -position_view.z;
+        let scale = match self.lens.is_perspective {
+            true if distance > 0.0 => 1.0 / distance,
+            true => return None,
+            false => 1.0,
+        };
+        let [half_width, half_height] = self.lens.half_extent;
+        let column = (0.5 + 0.5 * position_view.x * scale / half_width) * self.columns as f32;
+        let row = (0.5 - 0.5 * position_view.y * scale / half_height) * self.rows as f32;
+        // Not a number is outside, too.
+        let inside = column >= 0.0 && column < self.columns as f32 && row >= 0.0 && row < self.rows as f32;
+        inside.then(|| row as usize * self.columns as usize + column as usize)
+    }
+}
