@@ -52,13 +52,15 @@ const SPARE: f64 = 2.0;
 type Seen = BTreeMap<u32, f32>;
 
 /// A patch that has texels.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Held {
     block: Block,
     /// Step in which it was last seen.
     seen: u64,
     /// Whether its texels are those of the present.
     current: bool,
+    /// Which of them lie inside of bodies, found when they were first traced: as our points, they are judged once. `None` before.
+    inside: Option<Box<[bool]>>,
 }
 
 pub(in crate::eval) struct SasServer {
@@ -300,7 +302,7 @@ impl SasServer {
             let block = self.atlas.take(width, height).or_else(|| self.atlas.take(LEAST_SIDE, LEAST_SIDE));
             match block {
                 Some(block) => {
-                    self.held.insert(number, Held { block, seen: self.step, current: false });
+                    self.held.insert(number, Held { block, seen: self.step, current: false, inside: None });
                 }
                 None => homeless += 1,
             }
@@ -318,7 +320,7 @@ impl SasServer {
     /// Traces texels of what is seen that are not those of the present. How many rays it took, and whether any texel changed.
     fn shade(&mut self, pose: &Pose, seen: &Seen) -> (u64, bool) {
         let mut sites = Vec::new();
-        let mut blocks = Vec::new();
+        let mut numbers = Vec::new();
         for &number in seen.keys() {
             let Some(held) = self.held.get(&number).filter(|held| !held.current) else { continue };
             let (instance, patch, is_back) = self.patch(number);
@@ -333,18 +335,23 @@ impl SasServer {
                 let key = u64::from(number) << 16 | u64::from(j) << 8 | u64::from(i);
                 sites.push(Site { position_world: place, normal_world, key });
             }
-            blocks.push(held.block);
+            numbers.push(number);
         }
         let mut visibility = vec![1.0; sites.len()];
         trace_visibility(&self.tracer, &sites, &self.params.rays, &mut visibility);
-        let mut inside = vec![false; sites.len()];
-        find_inside(&self.scene, &self.tracer, &self.solids, &sites, &mut inside);
         let (mut changed, mut first) = (false, 0);
-        for block in blocks {
+        for number in numbers {
+            let Some(held) = self.held.get_mut(&number) else { continue };
+            let block = held.block;
             let (width, height) = (usize::from(block.width), usize::from(block.height));
             let of = first..first + width * height;
             first = of.end;
-            let values = without_inside(&visibility[of.clone()], &inside[of], (width, height));
+            let inside = held.inside.get_or_insert_with(|| {
+                let mut inside = vec![false; of.len()];
+                find_inside(&self.scene, &self.tracer, &self.solids, &sites[of.clone()], &mut inside);
+                inside.into()
+            });
+            let values = without_inside(&visibility[of], inside, (width, height));
             for (row, values) in values.chunks(width).enumerate() {
                 let start = (usize::from(block.y) + row) * self.atlas.width as usize + usize::from(block.x);
                 for (texel, visibility) in self.luma[start..start + width].iter_mut().zip(values) {
