@@ -123,6 +123,10 @@ pub(crate) struct StepArgs {
     /// leaves over; 0: no more than --point-rays. Without --ray-budget the first steps are as slow as the start.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) rays_still: u32,
+    /// Most points at a time: those of whole instances come when they are seen, and go when others need the room; where nobody
+    /// says what is seen, the largest instances have points [default: all points of all instances are there throughout].
+    #[arg(long, value_name = "N")]
+    pub(crate) max_points: Option<u32>,
 }
 
 #[derive(Debug, Clone, Args)]

@@ -35,6 +35,7 @@ pub(crate) fn server_config(scene: &Scene, args: &LightArgs) -> Result<ServerCon
         },
         update: UpdateParams { rays: visibility.point_rays, rays_still: step.rays_still, radius_m },
         publish: PublisherConfig { precision: precision(visibility), ..PublisherConfig::default() },
+        max_resident_points: step.max_points,
         ..ServerConfig::default()
     })
 }

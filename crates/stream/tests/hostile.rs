@@ -277,7 +277,8 @@ fn rules_of_changes_of_sets_are_enforced() {
     let size = usize::from(good[3] & 0x7f) | usize::from(good[4]) << 7;
     let (layout, values) = good[5..].split_at(size);
     let made = |gone: &[u8], layout: &[u8], rest: &[u8]| {
-        let size = [layout.len() as u8 & 0x7f | 0x80, (layout.len() >> 7) as u8];
+        let long = [layout.len() as u8 & 0x7f | 0x80, (layout.len() >> 7) as u8];
+        let size = if layout.len() < 0x80 { vec![layout.len() as u8] } else { long.to_vec() };
         reason(sets(&[&[1], gone, &size[..], layout, rest].concat()))
     };
     let with = |at: usize, bytes: &[u8]| {

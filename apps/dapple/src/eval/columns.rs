@@ -135,6 +135,12 @@ pub(super) const COLUMNS: [Column; 16] = [
         ..cost("backlog", "backlog", "", 0)
     },
     Column {
+        explanation: "most points at a time, where there is a cap on them",
+        kind: Kind::Other,
+        get: |row| row.steps?.most_points.map(|points| exact(points as f64)),
+        ..cost("most_points", "at a time", "", 0)
+    },
+    Column {
         explanation: "mean wall time of a server step: pose, trees, rays, encoding; differs from run to run",
         get: |row| row.times.server_ms.map(exact),
         ..cost("server_ms", "server", "ms", 2)
@@ -213,7 +219,7 @@ pub(super) fn bytes(count: u64) -> String {
 /// always, the rest where it differs.
 pub(super) fn settings(case: &Case) -> Vec<Setting> {
     type Part = (&'static str, bool, fn(&Params) -> Option<String>);
-    const PARTS: [Part; 7] = [
+    const PARTS: [Part; 8] = [
         ("points_per_m2", true, |p| p.points_per_m2.map(|n| format!("N {n}"))),
         ("hz", true, |p| p.hz.map(|hz| format!("{hz} Hz"))),
         ("rays_per_pixel", true, |p| p.rays_per_pixel.map(|rays| format!("{rays} rays"))),
@@ -221,6 +227,7 @@ pub(super) fn settings(case: &Case) -> Vec<Setting> {
         ("threshold", false, |p| p.threshold.map(|t| format!("threshold {t}"))),
         ("ray_budget", false, |p| p.ray_budget.map(|rays| format!("{} rays a step", number(rays as f64, 0)))),
         ("rays_still", false, |p| p.rays_still.map(|rays| format!("{rays} rays at rest"))),
+        ("max_points", false, |p| p.max_points.map(|points| format!("at most {} points", number(points.into(), 0)))),
     ];
     let of_row = |row: &Row| {
         let others = || case.rows.iter().filter(|other| other.method == row.method);

@@ -67,11 +67,13 @@ pub(super) struct AnyStep {
     pub(super) packet: Option<Packet>,
     pub(super) counts: StepCounts,
     pub(super) rays: u64,
+    /// Points that there are, and of how many instances they came and went; of a server whose points can.
+    pub(super) sets: Option<[u32; 3]>,
 }
 
 impl AnyStep {
     fn new(bytes: Option<Arc<[u8]>>, counts: StepCounts) -> AnyStep {
-        AnyStep { packet: bytes.map(Packet::from), rays: counts.rays(), counts }
+        AnyStep { packet: bytes.map(Packet::from), rays: counts.rays(), counts, sets: None }
     }
 }
 
@@ -149,7 +151,8 @@ impl AnyServer {
         match self {
             AnyServer::Own(server) => {
                 let report = server.step_with(time_s, input)?;
-                Ok(AnyStep::new(report.frame.map(|frame| frame.bytes), report.counts))
+                let sets = Some([report.points, report.spawned, report.evicted]);
+                Ok(AnyStep { sets, ..AnyStep::new(report.frame.map(|frame| frame.bytes), report.counts) })
             }
             AnyServer::Paper(server) => {
                 let size = stage.settings.size;
@@ -162,7 +165,7 @@ impl AnyServer {
             AnyServer::Sas(server) => {
                 let step = server.step(time_s, &camera_at(stage, time_s))?;
                 let packet = step.frame.as_ref().map(Packet::from);
-                Ok(AnyStep { packet, counts: StepCounts::default(), rays: step.rays })
+                Ok(AnyStep { packet, counts: StepCounts::default(), rays: step.rays, sets: None })
             }
         }
     }

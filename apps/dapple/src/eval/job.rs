@@ -148,7 +148,7 @@ impl Job {
         let mut pair = match self {
             Job::Points { points_per_m2, hz, .. } => {
                 let start = Start::new(stage, *points_per_m2);
-                let server = starts.server(stage.loaded, &start, &|part| progress(0.3 * part))?;
+                let server = starts.server(stage, *hz, &start, &|part| progress(0.3 * part))?;
                 let server = AnyServer::new(server, self.is_paper(), stage.settings.threshold)?;
                 let pair = Pair::new(server, (Some(*points_per_m2), *hz), stage, desk.record)?;
                 if self.methods().contains(&Method::Psao) {
@@ -353,6 +353,7 @@ impl Line {
                 .and_then(|p| p.points_per_m2)
                 .map(|_| settings.step.rays_still)
                 .filter(|rays| *rays > 0),
+            max_points: pair.and_then(|p| p.points_per_m2).and(settings.step.max_points),
             rays_per_pixel: match self.method {
                 Method::Rtao { rays } => Some(rays),
                 _ => None,

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use anyhow::{Context, Result};
+use dapple_scene::glam::Vec3;
 use dapple_scene::{CameraPath, Pose, Scene};
 use dapple_server::{Progress, Server, ServerConfig};
 use dapple_stream::{Precision, PublisherConfig, Recorder, RecordingHeader};
@@ -14,7 +15,6 @@ use super::ends::{AnyClient, AnyServer};
 use super::results::Steps;
 use super::stage::Stage;
 use crate::light::microseconds;
-use crate::source::Loaded;
 
 /// Servers at their start are kept for other rates and paths while they have no more points than this together.
 const MAX_KEPT_POINTS: usize = 6_000_000;
@@ -27,6 +27,7 @@ pub(super) struct Start {
     /// What values may be off, 255ths.
     pub(super) tolerance: u8,
     pub(super) seed: u32,
+    pub(super) max_points: Option<u32>,
 }
 
 impl Start {
@@ -41,6 +42,7 @@ impl Start {
             },
             tolerance: settings.threshold,
             seed: settings.seed,
+            max_points: settings.step.max_points,
         }
     }
 
@@ -52,7 +54,13 @@ impl Start {
         };
         let precision = Precision { tolerance: self.tolerance, ..Precision::default() };
         let publish = PublisherConfig { precision, ..PublisherConfig::default() };
-        ServerConfig { generate, update: self.update, publish, ..ServerConfig::default() }
+        ServerConfig {
+            generate,
+            update: self.update,
+            publish,
+            max_resident_points: self.max_points,
+            ..ServerConfig::default()
+        }
     }
 
     /// Whether a server would refuse these settings; quick.
@@ -83,16 +91,35 @@ impl Starts {
     /// A server at its start; `progress` gets the part that is done.
     pub(super) fn server(
         &mut self,
-        loaded: &Loaded,
+        stage: &Stage<'_>,
+        hz: f64,
         start: &Start,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Server> {
         if let Some((_, server)) = self.kept.iter().find(|(kept, _)| kept == start) {
             return Ok(server.clone());
         }
-        let scene = &loaded.scene;
+        let scene = &stage.loaded.scene;
         let config = start.config();
         let part = |done: usize, of: usize| done as f64 / of.max(1) as f64;
+        let start_progress = |p| match p {
+            Progress::Laying(done, of) => progress(0.3 * part(done, of)),
+            Progress::Tracing(done, of) => progress(0.3 + 0.5 * part(done, of)),
+            Progress::Cutting(done, of) => progress(0.8 + 0.2 * part(done, of)),
+        };
+        if start.max_points.is_some() {
+            // What is there at the start depends on where the path looks.
+            let seen = seen(0.0, hz, stage);
+            let input = StepInput { interest: &seen.volumes, eyes_world: &seen.eyes, ..StepInput::default() };
+            let server = Server::watched(scene.clone(), &config, &input, &start_progress)?;
+            if !server.too_large().is_empty() {
+                tracing::warn!(
+                    "--max-points: {} instances alone have more points and stay open",
+                    server.too_large().len()
+                );
+            }
+            return Ok(server);
+        }
         let instances = scene.instances.len();
         let laid = |done| progress(0.3 * part(done, instances));
         let points = generate_points(scene, &self.rest_pose, &self.tracer, &config.generate, &laid)?;
@@ -102,11 +129,7 @@ impl Starts {
             self.tracer.clone(),
             points,
             &config,
-            &|p| match p {
-                Progress::Laying(done, of) => progress(0.3 * part(done, of)),
-                Progress::Tracing(done, of) => progress(0.3 + 0.5 * part(done, of)),
-                Progress::Cutting(done, of) => progress(0.8 + 0.2 * part(done, of)),
-            },
+            &start_progress,
         )?;
         let points = |server: &Server| server.store().layout().len();
         while !self.kept.is_empty()
@@ -138,6 +161,7 @@ pub(super) struct Pair {
     pub(super) apply_seconds: f64,
     server: AnyServer,
     ray_budget: Option<u64>,
+    max_points: Option<u32>,
     recording: Option<Recording>,
 }
 
@@ -191,6 +215,7 @@ impl Pair {
             apply_seconds: 0.0,
             server,
             ray_budget: stage.settings.step.ray_budget,
+            max_points: stage.settings.step.max_points,
             recording,
         })
     }
@@ -205,12 +230,15 @@ impl Pair {
                 return Ok(changed);
             }
             let start = Instant::now();
-            let interest = interest(tick_s, self.hz, self.ray_budget, stage);
-            let input = StepInput { ray_budget: self.ray_budget, interest: &interest };
+            let seen = self.seen(tick_s, stage);
+            let input = self.input(&seen);
             let report = self.server.step(tick_s, &input, stage)?;
             self.server_seconds += start.elapsed().as_secs_f64();
             self.rays += report.rays;
             self.steps.add(&report.counts);
+            if let (Some(_), Some([points, spawned, evicted])) = (self.max_points, report.sets) {
+                self.steps.add_sets(points, spawned, evicted);
+            }
             let start = Instant::now();
             let mut bytes = 0;
             if let Some(packet) = &report.packet {
@@ -229,13 +257,25 @@ impl Pair {
 
     /// Steps once with the scene at `time_s`, uncounted.
     pub(super) fn step_at(&mut self, time_s: f64, stage: &Stage<'_>) -> Result<StepAt> {
-        let interest = interest(time_s, self.hz, self.ray_budget, stage);
-        let input = StepInput { ray_budget: self.ray_budget, interest: &interest };
+        let seen = self.seen(time_s, stage);
+        let input = self.input(&seen);
         let report = self.server.step(time_s, &input, stage)?;
         if let Some(packet) = &report.packet {
             self.client.receive(packet).context("the client refused the server's frame")?;
         }
         Ok(StepAt { changed: report.packet.is_some(), backlog: report.counts.backlog })
+    }
+
+    /// What the viewer sees by the next tick, where a budget or a cap asks for it.
+    fn seen(&self, tick_s: f64, stage: &Stage<'_>) -> Seen {
+        match self.ray_budget.is_some() || self.max_points.is_some() {
+            true => seen(tick_s, self.hz, stage),
+            false => Seen::default(),
+        }
+    }
+
+    fn input<'a>(&self, seen: &'a Seen) -> StepInput<'a> {
+        StepInput { ray_budget: self.ray_budget, interest: &seen.volumes, eyes_world: &seen.eyes }
     }
 
     pub(super) fn cut_bytes(&self) -> u64 {
@@ -250,18 +290,23 @@ impl Pair {
     }
 }
 
-/// What the viewer sees by the next tick, where a budget asks for it.
-fn interest(tick_s: f64, hz: f64, ray_budget: Option<u64>, stage: &Stage<'_>) -> Vec<ConvexVolume> {
-    if ray_budget.is_none() {
-        return Vec::new();
-    }
+/// What the viewer sees by the next tick.
+#[derive(Default)]
+struct Seen {
+    volumes: Vec<ConvexVolume>,
+    eyes: Vec<Vec3>,
+}
+
+fn seen(tick_s: f64, hz: f64, stage: &Stage<'_>) -> Seen {
     let scene = stage.scene();
     let path: &CameraPath = &stage.path;
     let size = stage.settings.size;
     let aspect = size.width as f32 / size.height as f32;
-    let frustum = |time_s: f64| {
+    let mut seen = Seen::default();
+    for time_s in [tick_s, tick_s + 1.0 / hz] {
         let camera = path.camera(scene, &scene.pose_undeformed(time_s));
-        ConvexVolume::frustum(&camera, aspect, f32::INFINITY, stage.radius_m)
-    };
-    vec![frustum(tick_s), frustum(tick_s + 1.0 / hz)]
+        seen.volumes.push(ConvexVolume::frustum(&camera, aspect, f32::INFINITY, stage.radius_m));
+        seen.eyes.push(camera.world_from_view.translation.into());
+    }
+    seen
 }

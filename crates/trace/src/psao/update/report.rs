@@ -1,6 +1,7 @@
 //! What a step is given and what it tells.
 
 use dapple_store::points::Change;
+use glam::Vec3;
 
 use super::ConvexVolume;
 
@@ -13,6 +14,9 @@ pub struct StepInput<'a> {
     pub ray_budget: Option<u64>,
     /// What viewers see; points elsewhere wait. Empty (default): everything is seen.
     pub interest: &'a [ConvexVolume],
+    /// Where viewers look from, metres: of instances that must share a cap on points, those that look large from there come first. Empty
+    /// (default): those that are large do.
+    pub eyes_world: &'a [Vec3],
 }
 
 /// What a step did, in points and rays.

@@ -4,6 +4,7 @@ mod budget;
 mod exact;
 mod memory;
 mod refine;
+mod spawn;
 mod timing;
 
 use dapple_scene::glam::{Affine3A, Quat, Vec3};
@@ -13,7 +14,7 @@ use crate::psao::generate::{GenerateParams, generate_points};
 use crate::test_support::{Random, cube, deform, quad, scene, soup, sphere};
 
 /// No budget, everything is seen.
-const FREE: StepInput<'_> = StepInput { ray_budget: None, interest: &[] };
+const FREE: StepInput<'_> = StepInput { ray_budget: None, interest: &[], eyes_world: &[] };
 
 fn start_at(scene: &Scene, pose: &Pose, params: UpdateParams, points_per_m2: f32) -> (Tracer, Updater) {
     let tracer = Tracer::new(scene, pose);
