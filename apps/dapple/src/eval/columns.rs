@@ -51,7 +51,7 @@ const fn cost(key: &'static str, title: &'static str, unit: &'static str, digits
 pub(super) const VISIBILITY: &str = "visibility_psnr_db";
 
 /// All columns after those that name a row: first what most look for.
-pub(super) const COLUMNS: [Column; 16] = [
+pub(super) const COLUMNS: [Column; 17] = [
     Column {
         explanation: "PSNR of visibility against the truth over all pixels that show geometry; the mean squared error is \
             pooled over the pictures",
