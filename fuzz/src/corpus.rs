@@ -113,7 +113,9 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
     calls.extend([5, 0, 0, 0, 0, 0, 2, 0, 0, 0, 7, 1, 0, 9, 6, 0, 0, 0, 0, 3, 0, 1, 2, 4, 7, 0, 0]);
     calls.extend([1, 1, 0, 1, 0, 77, 3, 0, 0, 64, 8, 1, 0, 5, 1, 0, 1, 0]);
     // Sets go, and two of one point come.
-    calls.extend([7, 0, 1, 0, 9, 0, 1, 0, 1, 2, 3, 9, 1, 4, 32, 50, 7, 1, 1, 0, 19, 0, 1, 0, 7, 7, 7, 9, 1, 4, 32, 51]);
+    calls.extend([
+        7, 0, 1, 0, 9, 0, 1, 0, 1, 2, 3, 9, 1, 4, 32, 50, 7, 1, 1, 0, 19, 0, 1, 0, 7, 7, 7, 9, 1, 4, 32, 51,
+    ]);
     seeds.push(("session_ops", "each-call".to_owned(), calls));
 
     for (name, frames) in [

@@ -104,13 +104,18 @@ impl Session {
         let keep = input.byte();
         let layout = self.store.layout().clone();
         let instances = layout.sets().iter().map(|set| set.instance);
-        let gone: Vec<u32> =
-            instances.zip(0..8).filter(|(_, bit)| keep >> bit & 1 == 0).map(|(instance, _)| instance).collect();
+        let gone: Vec<u32> = instances
+            .zip(0..8)
+            .filter(|(_, bit)| keep >> bit & 1 == 0)
+            .map(|(instance, _)| instance)
+            .collect();
         let left = self.store.with_sets(&gone, &PointStore::default()).expect("they are there");
         let other = input.store();
-        let sets = other.layout().sets().iter().filter(|set| left.layout().set_of_instance(set.instance).is_none());
+        let sets =
+            other.layout().sets().iter().filter(|set| left.layout().set_of_instance(set.instance).is_none());
         let sets = sets.cloned().collect();
-        let added = PointLayout::new(layout.quantum_m(), layout.spacing_m(), sets).expect("points were sorted");
+        let added =
+            PointLayout::new(layout.quantum_m(), layout.spacing_m(), sets).expect("points were sorted");
         let added = PointStore::default().carried(added.into(), &other);
         self.store = left.with_sets(&[], &added).expect("they are not there");
     }

@@ -32,7 +32,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let layer = PointLayer::new(&scene, &config.generate)?;
     let mut sizes: Vec<u64> = (0..scene.instances.len()).map(|i| layer.most_points(i)).collect();
     sizes.sort_unstable_by(|a, b| b.cmp(a));
-    println!("at most {} points in all; the largest instances have {:?}", sizes.iter().sum::<u64>(), &sizes[..sizes.len().min(8)]);
+    println!(
+        "at most {} points in all; the largest instances have {:?}",
+        sizes.iter().sum::<u64>(),
+        &sizes[..sizes.len().min(8)]
+    );
 
     let look = |time_s: f64| {
         let camera = path.camera(&scene, &scene.pose_undeformed(time_s));
@@ -91,7 +95,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let seconds = f64::from(ticks) / hz;
     let kbit = |bytes: usize| bytes as f64 * 8e-3 / seconds;
     println!("{spawned} instances came and {evicted} went; at most {most} points");
-    println!("deltas {} in {:.1} kbit/s, changes of sets {} in {:.1} kbit/s", deltas.0, kbit(deltas.1), sets.0, kbit(sets.1));
+    println!(
+        "deltas {} in {:.1} kbit/s, changes of sets {} in {:.1} kbit/s",
+        deltas.0,
+        kbit(deltas.1),
+        sets.0,
+        kbit(sets.1)
+    );
     println!("memory: server {:.1} bytes a point, client {:.1}, {} layers", memory.0, memory.1, memory.2);
     for (what, mut ms) in [("step", step_ms), ("receive", receive_ms)] {
         ms.sort_by(f64::total_cmp);

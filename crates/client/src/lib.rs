@@ -107,7 +107,11 @@ impl Client {
                     atlas.begin_update(1.0);
                     let cuts = self.subscriber.cuts();
                     atlas.change_sets(&self.scene, store.layout().clone(), cuts, removed);
-                    atlas.apply(changes.iter().map(|c| PointChange { point: c.point, old: c.old, new: c.new }));
+                    atlas.apply(changes.iter().map(|c| PointChange {
+                        point: c.point,
+                        old: c.old,
+                        new: c.new,
+                    }));
                     while !atlas.work(&self.scene, store.visibility(), usize::MAX).is_complete() {}
                 }
             }

@@ -220,7 +220,8 @@ impl Server {
         if let Some(population) = &mut self.population {
             spawned = self.updater.take_ready();
             if !spawned.is_empty() {
-                self.publisher.set_cuts(self.updater.store().layout().clone(), population.take_cuts(&spawned));
+                self.publisher
+                    .set_cuts(self.updater.store().layout().clone(), population.take_cuts(&spawned));
             }
         }
         let frame = self.publisher.publish(self.updater.store());

@@ -41,7 +41,11 @@ impl Population {
     }
 
     /// The points of a start, of whom viewers see or nobody says otherwise.
-    pub(crate) fn fill(&mut self, scene: &Scene, input: &StepInput<'_>) -> Result<GeneratedPoints, GenerateError> {
+    pub(crate) fn fill(
+        &mut self,
+        scene: &Scene,
+        input: &StepInput<'_>,
+    ) -> Result<GeneratedPoints, GenerateError> {
         let bounds: Vec<Aabb> =
             (0..scene.instances.len()).map(|i| scene.instance_bounds_world(&self.pose, i)).collect();
         let turnover = self.residency.fill(&watch(&bounds, input));

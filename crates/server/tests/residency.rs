@@ -114,7 +114,9 @@ fn a_cap_out_of_range_is_refused_and_a_scene_beyond_the_limit_is_not() {
     }
     let mut dense = config(Some(200));
     dense.generate.max_points = 300;
-    assert!(Server::new(scene.clone(), &ServerConfig { max_resident_points: None, ..dense }, &|_| ()).is_err());
+    assert!(
+        Server::new(scene.clone(), &ServerConfig { max_resident_points: None, ..dense }, &|_| ()).is_err()
+    );
     dense.check(&scene).unwrap();
     let mut server = Server::new(scene, &dense, &|_| ()).unwrap();
     assert!((100..=200).contains(&server.step(0.1).unwrap().points));

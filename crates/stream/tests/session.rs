@@ -78,7 +78,8 @@ fn toggle(store: &mut PointStore, places: &[prop::sample::Index]) {
         let quantum = store.layout().quantum_m();
         let held = store.layout().set_of_instance(instance).is_some();
         let count = instance * 3 % 50;
-        let points = (0..count).map(|i| ([i * i % 90, i, instance], [127, (instance + i / 9) as u8])).collect();
+        let points =
+            (0..count).map(|i| ([i * i % 90, i, instance], [127, (instance + i / 9) as u8])).collect();
         let sets = vec![common::set(instance, [instance as f32, 0.0, -0.0], points)];
         let added = PointLayout::new(quantum, store.layout().spacing_m(), sets).unwrap();
         let values = (0..count).map(|i| (255 - i) as u8).collect();
@@ -377,7 +378,12 @@ fn sets_that_come_and_go_are_a_small_frame_and_what_stays_is_kept() {
     next.apply(&[Change { point: 5, visibility: 9 }]).unwrap();
     let frame = publisher.publish(&next).unwrap();
     assert_eq!((frame.kind, frame.group, frame.epoch), (FrameKind::Sets, first.group, 1));
-    assert!(frame.bytes.len() < 600 && first.bytes.len() > 3000, "{}, {}", frame.bytes.len(), first.bytes.len());
+    assert!(
+        frame.bytes.len() < 600 && first.bytes.len() > 3000,
+        "{}, {}",
+        frame.bytes.len(),
+        first.bytes.len()
+    );
     assert_eq!(publisher.changed(), 91);
     let changes = vec![dapple_stream::ValueChange { point: 5, old: 200, new: 9 }];
     let expected = Applied::Sets { removed: vec![1], added: vec![4], changes };

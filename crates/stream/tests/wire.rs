@@ -64,12 +64,8 @@ fn with_other_sets() -> (PointStore, Cuts) {
     sets.push(common::set(5, [0.0, 0.0, 3.0], points));
     let layout = PointLayout::new(0.001953125, 0.0625, sets).unwrap();
     let store = PointStore::new(layout.into(), vec![200, 240, 128, 0, 100, 90]).unwrap();
-    let came = SetCuts {
-        instance: 5,
-        sites: 4,
-        fingerprint: 0x89ab_cdef,
-        cuts: vec![SiteCut { site: 2, mask: 1 }],
-    };
+    let came =
+        SetCuts { instance: 5, sites: 4, fingerprint: 0x89ab_cdef, cuts: vec![SiteCut { site: 2, mask: 1 }] };
     (store, cuts().with_sets(&[2], &Cuts::new(vec![came]).unwrap()))
 }
 

@@ -227,7 +227,9 @@ pub(super) fn settings(case: &Case) -> Vec<Setting> {
         ("threshold", false, |p| p.threshold.map(|t| format!("threshold {t}"))),
         ("ray_budget", false, |p| p.ray_budget.map(|rays| format!("{} rays a step", number(rays as f64, 0)))),
         ("rays_still", false, |p| p.rays_still.map(|rays| format!("{rays} rays at rest"))),
-        ("max_points", false, |p| p.max_points.map(|points| format!("at most {} points", number(points.into(), 0)))),
+        ("max_points", false, |p| {
+            p.max_points.map(|points| format!("at most {} points", number(points.into(), 0)))
+        }),
     ];
     let of_row = |row: &Row| {
         let others = || case.rows.iter().filter(|other| other.method == row.method);

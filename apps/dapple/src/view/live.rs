@@ -138,7 +138,8 @@ impl Live {
             }
         }
         let tick = self.tick_at(time_s);
-        let differs = self.tick != Some(tick) || self.look != self.asked_look || self.is_capped && self.is_busy;
+        let differs =
+            self.tick != Some(tick) || self.look != self.asked_look || self.is_capped && self.is_busy;
         if self.start == Start::Done && self.in_flight == 0 && differs {
             self.ask(tick);
         }
@@ -242,10 +243,10 @@ fn run(
             Request::Time(time_s, look) => {
                 let start = Instant::now();
                 let (volume, eye) = look.map(|look| (look.volume, look.eye_world)).unzip();
-                let input =
-                    StepInput { interest: volume.as_slice(), eyes_world: eye.as_slice(), ..*input };
+                let input = StepInput { interest: volume.as_slice(), eyes_world: eye.as_slice(), ..*input };
                 let report = server.step_with(time_s, &input)?;
-                let (seconds, busy) = (start.elapsed().as_secs_f64(), report.frame.is_some() || report.rays > 0);
+                let (seconds, busy) =
+                    (start.elapsed().as_secs_f64(), report.frame.is_some() || report.rays > 0);
                 let stepped = Reply::Stepped { seconds, traced: report.traced, busy };
                 if let Some(frame) = report.frame {
                     let _ = answers.send(Reply::Frame(frame.bytes));

@@ -161,7 +161,9 @@ impl CellSubscriber {
                 let grids = self.limits.max_grids as usize * GRID_BYTES;
                 contents(self.limits.max_buckets) + grids + 32 + 8 + INDEX_BYTES
             }
-            FrameKind::Delta | FrameKind::Sets => contents(self.table().map_or(0, |table| table.layout().bucket_count())),
+            FrameKind::Delta | FrameKind::Sets => {
+                contents(self.table().map_or(0, |table| table.layout().bucket_count()))
+            }
         }
     }
 

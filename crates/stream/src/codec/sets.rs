@@ -109,8 +109,8 @@ pub(crate) fn decode_sets_change<'a>(
         let near = Near::new(&layout, local_bits);
         let value_bytes = size(reader.varint("values")?);
         let values = decode_values(reader.take(value_bytes, "values")?, &layout, &near)?;
-        let added = PointStore::new(layout.into(), values)
-            .map_err(|_| bad("values", "do not fit the layout"))?;
+        let added =
+            PointStore::new(layout.into(), values).map_err(|_| bad("values", "do not fit the layout"))?;
         (added, cuts)
     };
     let changes = (reader.len() > 0).then_some(DeltaParts { base_epoch: parts.base_epoch, changes: reader });
@@ -136,7 +136,8 @@ fn check_fit(
     if added.sets().is_empty() {
         return bad("are none");
     }
-    let is_held = |instance| held.set_of_instance(instance).is_some() && gone.binary_search(&instance).is_err();
+    let is_held =
+        |instance| held.set_of_instance(instance).is_some() && gone.binary_search(&instance).is_err();
     if added.sets().iter().any(|set| is_held(set.instance)) {
         return bad("are there already");
     }

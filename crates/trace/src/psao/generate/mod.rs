@@ -19,8 +19,8 @@ use rayon::prelude::*;
 
 pub use anchor::Anchor;
 pub(crate) use anchor::{PosedPoint, pose_anchor};
-pub use layer::PointLayer;
 use eliminate::{Candidate, eliminate, maximum_radius};
+pub use layer::PointLayer;
 
 use crate::inside::mostly_backs;
 use crate::rtao::Site;
@@ -179,8 +179,12 @@ struct SurfaceArea {
 impl SurfaceArea {
     fn measure(scene: &Scene, instance: usize) -> SurfaceArea {
         let placed = &scene.instances[instance];
-        let mut all =
-            SurfaceArea { cumulative: Vec::new(), total: 0.0, min_rest: Vec3::INFINITY, max_rest: -Vec3::INFINITY };
+        let mut all = SurfaceArea {
+            cumulative: Vec::new(),
+            total: 0.0,
+            min_rest: Vec3::INFINITY,
+            max_rest: -Vec3::INFINITY,
+        };
         if !placed.receives {
             return all;
         }

@@ -88,8 +88,9 @@ enum Class {
     Here,
 }
 
-/// What is there counts as so many times as large as it looks, so that two that look alike do not take turns.
-const HERE_FACTOR: f32 = 2.0;
+/// What is there counts as so many times as large as it looks: two that look alike do not take turns, and what one looks at does not
+/// lose its light for what looks a little larger.
+const HERE_FACTOR: f32 = 8.0;
 
 /// What is as near to a view, in parts of its distance to the eye, is soon seen: some 30° to the side.
 const SOON: f32 = 0.5;
@@ -197,7 +198,8 @@ impl Residency {
             let class = if watch.interest.is_empty() || touches(bounds) {
                 instance.seen = self.step;
                 Class::Seen
-            } else if nearest_squared.is_finite() && touches(&bounds.inflated(SOON * nearest_squared.sqrt())) {
+            } else if nearest_squared.is_finite() && touches(&bounds.inflated(SOON * nearest_squared.sqrt()))
+            {
                 Class::Soon
             } else {
                 Class::Here

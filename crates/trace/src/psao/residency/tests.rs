@@ -7,7 +7,9 @@ use super::*;
 
 /// Boxes of one metre along x, one every two metres.
 fn row(count: usize) -> Vec<Aabb> {
-    (0..count).map(|i| Aabb { min: Vec3::X * 2.0 * i as f32, max: Vec3::X * 2.0 * i as f32 + Vec3::ONE }).collect()
+    (0..count)
+        .map(|i| Aabb { min: Vec3::X * 2.0 * i as f32, max: Vec3::X * 2.0 * i as f32 + Vec3::ONE })
+        .collect()
 }
 
 /// Sees the boxes whose numbers lie in `from..to`, all of them whole.

@@ -199,7 +199,8 @@ impl Updater {
         for spawn in &mut self.spawns {
             let Spawn { anchors, values, clusters, untraced, .. } = spawn;
             let (anchors, known) = (&anchors[..], &[][..]);
-            let context = Context { scene, pose, tracer, anchors, patterns, params, movers: Vec::new(), known };
+            let context =
+                Context { scene, pose, tracer, anchors, patterns, params, movers: Vec::new(), known };
             let traced: Vec<Vec<u8>> = clusters
                 .par_iter()
                 .map_init(Scratch::default, |scratch, cluster| {

@@ -115,11 +115,13 @@ fn a_set_counts_when_all_its_points_are_traced_and_not_before() {
     let (layer, sets) = laid(&scene, &pose);
     let mut tracer = Tracer::new(&scene, &pose);
     let params = UpdateParams::default();
-    let mut updater =
-        Updater::new(&scene, &pose, &tracer, layer.empty().unwrap(), params, &|_| ()).unwrap();
+    let mut updater = Updater::new(&scene, &pose, &tracer, layer.empty().unwrap(), params, &|_| ()).unwrap();
     let points = sets[0].layout.len() as u64;
     updater.spawn(sets[0].clone()).unwrap();
-    assert_eq!(updater.spawn(sets[0].clone()).unwrap_err().to_string(), "layout: instance 0 has a set already");
+    assert_eq!(
+        updater.spawn(sets[0].clone()).unwrap_err().to_string(),
+        "layout: instance 0 has a set already"
+    );
     // A fifth of the rays a step: a quarter of the budget is kept for them, and nothing else needs the rest.
     let input = StepInput { ray_budget: Some(points * 64 / 5 + 64), ..FREE };
     for step in 0..5 {
