@@ -113,7 +113,8 @@ pub(crate) fn decode_sets_change<'a>(
             PointStore::new(layout.into(), values).map_err(|_| bad("values", "do not fit the layout"))?;
         (added, cuts)
     };
-    let changes = (!reader.is_empty()).then_some(DeltaParts { base_epoch: parts.base_epoch, changes: reader });
+    let changes =
+        (!reader.is_empty()).then_some(DeltaParts { base_epoch: parts.base_epoch, changes: reader });
     Ok(DecodedSets { gone, added, cuts: added_cuts, changes })
 }
 
