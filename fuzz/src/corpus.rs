@@ -41,7 +41,11 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
         seeds.push(("decode_frame", format!("{name}-frame"), frame.bytes.to_vec()));
         let header = FrameHeader::parse(&frame.bytes, &Limits::default()).expect("a sound frame");
         let payload = &frame.bytes[header.header_bytes..][..header.payload_bytes];
-        let kind = u8::from(frame.kind == FrameKind::Delta);
+        let kind = match frame.kind {
+            FrameKind::Snapshot => 0,
+            FrameKind::Delta => 1,
+            FrameKind::Sets => 2u8,
+        };
         seeds.push(("decode_frame", format!("{name}-payload"), [&[kind], payload].concat()));
     };
     let publish = |publisher: &mut Publisher, store: &PointStore| publisher.publish(store).expect("a change");
@@ -52,6 +56,17 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
     store.apply(&[Change { point: 17, visibility: 3 }]).expect("it exists");
     let delta = publish(&mut publisher, &store);
     frame("delta-of-one", &delta);
+    let mut sets = Publisher::new([0; 32], PublisherConfig::default());
+    publish(&mut sets, &sample());
+    let first = sample().layout().sets()[0].instance;
+    let less = sample().with_sets(&[first], &PointStore::default()).expect("it is there");
+    frame("sets-go", &publish(&mut sets, &less));
+    let mut other = Publisher::new([0; 32], PublisherConfig::default());
+    publish(&mut other, &less);
+    let mut back = sample();
+    back.apply(&[Change { point: 70, visibility: 3 }]).expect("it exists");
+    frame("sets-come", &publish(&mut other, &back));
+
     let mut all = Publisher::new([0; 32], PublisherConfig::default());
     publish(&mut all, &sample());
     let inverse = sample().visibility().iter().map(|v| v ^ 0x55).collect();
@@ -96,7 +111,11 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
     }
     let mut calls = start.to_vec();
     calls.extend([5, 0, 0, 0, 0, 0, 2, 0, 0, 0, 7, 1, 0, 9, 6, 0, 0, 0, 0, 3, 0, 1, 2, 4, 7, 0, 0]);
-    calls.extend([1, 1, 0, 1, 0, 77, 3, 0, 0, 64, 7, 1, 0, 5, 1, 0, 1, 0]);
+    calls.extend([1, 1, 0, 1, 0, 77, 3, 0, 0, 64, 8, 1, 0, 5, 1, 0, 1, 0]);
+    // Sets go, and two of one point come.
+    calls.extend([
+        7, 0, 1, 0, 9, 0, 1, 0, 1, 2, 3, 9, 1, 4, 32, 50, 7, 1, 1, 0, 19, 0, 1, 0, 7, 7, 7, 9, 1, 4, 32, 51,
+    ]);
     seeds.push(("session_ops", "each-call".to_owned(), calls));
 
     for (name, frames) in [

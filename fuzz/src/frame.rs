@@ -19,7 +19,7 @@ static HOLDING: LazyLock<Subscriber> = LazyLock::new(|| {
     subscriber
 });
 
-/// Receives `data` as it is, and its bytes after the first as the payload of a snapshot or (first byte odd) delta
+/// Receives `data` as it is, and its bytes after the first as the payload of a snapshot, delta or change of sets (first byte modulo 3)
 /// for epoch 1 of group 0. Nothing may panic; an error changes nothing; what was taken can be sent on.
 pub fn decode_frame(data: &[u8]) {
     // A header is read from a prefix just as from the whole.
@@ -29,7 +29,7 @@ pub fn decode_frame(data: &[u8]) {
     }
     receive(data);
     if let Some((kind, payload)) = data.split_first() {
-        let kind = if kind % 2 == 1 { FrameKind::Delta } else { FrameKind::Snapshot };
+        let kind = [FrameKind::Snapshot, FrameKind::Delta, FrameKind::Sets][usize::from(*kind) % 3];
         receive(&seal(kind, 0, 1, payload));
     }
 }
@@ -42,7 +42,7 @@ fn receive(frame: &[u8]) {
                 assert!(start.store() == subscriber.store());
                 assert_eq!((start.group(), start.epoch()), (subscriber.group(), subscriber.epoch()));
             }
-            Ok(Applied::NewLayout | Applied::Changes(_)) => {
+            Ok(Applied::NewLayout | Applied::Changes(_) | Applied::Sets { .. }) => {
                 let store = subscriber.store().expect("it was applied");
                 let again = fingerprint(store);
                 let mut next = Subscriber::new(None, Limits { max_frame_bytes: 1 << 22, ..LIMITS });

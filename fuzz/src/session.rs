@@ -1,6 +1,6 @@
 //! Any list of calls on a publisher and its subscribers: they converge.
 
-use dapple_store::points::{Change, PointStore};
+use dapple_store::points::{Change, PointLayout, PointStore};
 use dapple_stream::{Applied, Frame, Limits, Precision, Publisher, PublisherConfig, Subscriber};
 
 use crate::input::{Input, fingerprint};
@@ -55,7 +55,7 @@ pub fn session_ops(data: &[u8]) {
 
 impl Session {
     fn call(&mut self, input: &mut Input<'_>) {
-        match input.byte() % 8 {
+        match input.byte() % 9 {
             0 | 1 => {
                 let points = self.store.visibility().len();
                 let changes: Vec<Change> = (0..if points > 0 { input.below(16) } else { 0 })
@@ -91,8 +91,33 @@ impl Session {
                 assert!(self.lossy[which].receive(&bytes).is_err(), "damage went unnoticed");
                 assert!(self.lossy[which].store() == before.as_ref());
             }
+            7 => {
+                self.change_sets(input);
+                self.publish();
+            }
             _ => self.rejoin(input.below(2)),
         }
+    }
+
+    /// Some sets go, those of another store come where there are none.
+    fn change_sets(&mut self, input: &mut Input<'_>) {
+        let keep = input.byte();
+        let layout = self.store.layout().clone();
+        let instances = layout.sets().iter().map(|set| set.instance);
+        let gone: Vec<u32> = instances
+            .zip(0..8)
+            .filter(|(_, bit)| keep >> bit & 1 == 0)
+            .map(|(instance, _)| instance)
+            .collect();
+        let left = self.store.with_sets(&gone, &PointStore::default()).expect("they are there");
+        let other = input.store();
+        let sets =
+            other.layout().sets().iter().filter(|set| left.layout().set_of_instance(set.instance).is_none());
+        let sets = sets.cloned().collect();
+        let added =
+            PointLayout::new(layout.quantum_m(), layout.spacing_m(), sets).expect("points were sorted");
+        let added = PointStore::default().carried(added.into(), &other);
+        self.store = left.with_sets(&[], &added).expect("they are not there");
     }
 
     fn publish(&mut self) {

@@ -128,6 +128,10 @@ pub(crate) struct StepArgs {
     /// exact [default: as many as it takes].
     #[arg(long, value_name = "BITS/S")]
     pub(crate) budget: Option<BitRate>,
+    /// Most points at a time: those of whole instances come when they are seen, and go when others need the room; where nobody
+    /// says what is seen, the largest instances have points [default: all points of all instances are there throughout].
+    #[arg(long, value_name = "N")]
+    pub(crate) max_points: Option<u32>,
 }
 
 /// Bits a second.

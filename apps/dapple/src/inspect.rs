@@ -26,11 +26,12 @@ pub(crate) fn run(args: &InspectArgs) -> Result<()> {
 
     let mut subscriber = Subscriber::new(Some(header.scene_hash), Limits::default());
     let mut refused = None;
-    let (mut snapshots, mut deltas) = (Kind::default(), Kind::default());
+    let (mut snapshots, mut deltas, mut sets) = (Kind::default(), Kind::default(), Kind::default());
     for (number, entry) in recording.entries().enumerate() {
         match entry.header.kind {
             FrameKind::Snapshot => snapshots.add(entry.frame.len()),
             FrameKind::Delta => deltas.add(entry.frame.len()),
+            FrameKind::Sets => sets.add(entry.frame.len()),
         }
         if let Err(error) = subscriber.receive(entry.frame)
             && refused.is_none()
@@ -51,6 +52,10 @@ pub(crate) fn run(args: &InspectArgs) -> Result<()> {
         per_second(snapshots.bytes)
     );
     say!("deltas     {} in {} bytes, {:.1} kbit/s", deltas.count, deltas.bytes, per_second(deltas.bytes));
+    if sets.count > 0 {
+        let (count, bytes) = (sets.count, sets.bytes);
+        say!("sets       {count} come or go in {bytes} bytes, {:.1} kbit/s", per_second(bytes));
+    }
     say!(
         "file       {} bytes, {:.1} kbit/s",
         recording.size_bytes(),

@@ -37,6 +37,7 @@ pub(crate) fn server_config(scene: &Scene, args: &LightArgs) -> Result<ServerCon
         update: UpdateParams { rays: visibility.point_rays, rays_still: step.rays_still, radius_m },
         publish: PublisherConfig { precision: precision(visibility), ..PublisherConfig::default() },
         bits_per_s: args.bits_per_s(),
+        max_resident_points: step.max_points,
         ..ServerConfig::default()
     })
 }

@@ -101,6 +101,20 @@ impl Client {
                 atlas.begin_update(1.0);
                 atlas.apply(changes.iter().map(|c| PointChange { point: c.point, old: c.old, new: c.new }));
             }
+            (Applied::Sets { removed, changes, .. }, atlas) => {
+                self.index = OnceLock::new();
+                if let (Some(atlas), Some(store)) = (atlas, self.subscriber.store()) {
+                    atlas.begin_update(1.0);
+                    let cuts = self.subscriber.cuts();
+                    atlas.change_sets(&self.scene, store.layout().clone(), cuts, removed);
+                    atlas.apply(changes.iter().map(|c| PointChange {
+                        point: c.point,
+                        old: c.old,
+                        new: c.new,
+                    }));
+                    while !atlas.work(&self.scene, store.visibility(), usize::MAX).is_complete() {}
+                }
+            }
             _ => {}
         }
         Ok(applied)

@@ -5,20 +5,23 @@
 //! ```
 
 pub mod paper;
+mod population;
 
 use std::sync::Arc;
 
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Pose, Scene};
-use dapple_store::points::PointStore;
+use dapple_store::points::{LayoutError, PointStore};
 use dapple_stream::{Budget, Frame, FrameKind, Precision, Publisher, PublisherConfig, Spending};
 use dapple_trace::Tracer;
 use dapple_trace::psao::cuts::find_cuts;
 use dapple_trace::psao::generate::{
-    GenerateError, GenerateParams, GeneratedPoints, check_density, generate_points,
+    GenerateError, GenerateParams, GeneratedPoints, PointLayer, check_density, generate_points,
 };
 use dapple_trace::psao::paper::PaperError;
 use dapple_trace::psao::update::{StepCounts, StepInput, UpdateError, UpdateParams, Updater};
+
+use population::Population;
 
 /// Settings of a server. Each group documents its own ranges and defaults.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +38,10 @@ pub struct ServerConfig {
     /// Whether rays find out which points must not count at which texels of a client's atlas, because something solid stands
     /// between them. Costs some seconds at the start and some bytes of each snapshot; light leaks less. Default true.
     pub cuts: bool,
+    /// Most points at a time: instances share them, and their points come and go with what viewers see
+    /// ([`StepInput::interest`]). Then the scene may have more than [`GenerateParams::max_points`] in all; at most so many at a time.
+    /// Default `None`: all points of all instances are there from the start to the end.
+    pub max_resident_points: Option<u32>,
 }
 
 impl ServerConfig {
@@ -43,7 +50,13 @@ impl ServerConfig {
     /// # Errors
     /// What [`Server::new`] would say.
     pub fn check(&self, scene: &Scene) -> Result<(), ServerError> {
-        check_density(scene, &self.generate)?;
+        match self.max_resident_points {
+            None => check_density(scene, &self.generate)?,
+            Some(points) if !(1..=self.generate.max_points).contains(&points) => {
+                return Err(ServerError::BadCap { points, limit: self.generate.max_points });
+            }
+            Some(_) => drop(PointLayer::new(scene, &self.generate)?),
+        }
         Ok(self.update.check()?)
     }
 }
@@ -56,6 +69,7 @@ impl Default for ServerConfig {
             publish: PublisherConfig { precision: Precision { tolerance: 4, step: 0 }, ..Default::default() },
             bits_per_s: None,
             cuts: true,
+            max_resident_points: None,
         }
     }
 }
@@ -80,6 +94,17 @@ pub enum ServerError {
     /// Settings of the update are out of range.
     #[error(transparent)]
     Update(#[from] UpdateError),
+    /// The cap on points is out of range.
+    #[error("at most {points} points at a time: must be 1 to {limit}")]
+    BadCap {
+        /// What was asked for.
+        points: u32,
+        /// [`GenerateParams::max_points`].
+        limit: u32,
+    },
+    /// Points that came did not fit those that there are.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
     /// The paper's table could not be made.
     #[error(transparent)]
     Paper(#[from] PaperError),
@@ -103,6 +128,12 @@ pub struct StepReport {
     pub changed: u32,
     /// Points that subscribers hold less exactly than they should, because the budget of bits did not reach.
     pub held_back: u32,
+    /// Points that there are, those that wait for their first rays counted.
+    pub points: u32,
+    /// Instances whose points came with this step's frame.
+    pub spawned: u32,
+    /// Instances whose points went.
+    pub evicted: u32,
 }
 
 /// A scene that is being lit. A clone goes on from the same state by itself.
@@ -115,6 +146,8 @@ pub struct Server {
     budget: Option<Budget>,
     tolerance: u8,
     dropped_inside: u32,
+    /// Who has points, where there is a cap on them.
+    population: Option<Population>,
 }
 
 impl Server {
@@ -124,8 +157,28 @@ impl Server {
         config: &ServerConfig,
         progress: &(dyn Fn(Progress) + Sync),
     ) -> Result<Server, ServerError> {
+        Server::watched(scene, config, &StepInput::default(), progress)
+    }
+
+    /// As [`Server::new`], knowing what viewers see at first: where there is a cap on points, they get them.
+    pub fn watched(
+        scene: Arc<Scene>,
+        config: &ServerConfig,
+        input: &StepInput<'_>,
+        progress: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Server, ServerError> {
         let pose = scene.pose(0.0);
         let tracer = Tracer::new(&scene, &pose);
+        if let Some(most_points) = config.max_resident_points {
+            config.check(&scene)?;
+            let mut population = Population::new(&scene, pose.clone(), tracer.clone(), config, most_points)?;
+            progress(Progress::Laying(0, 1));
+            let points = population.fill(&scene, input)?;
+            progress(Progress::Laying(1, 1));
+            let mut server = Server::with_points(scene, pose, tracer, points, config, progress)?;
+            server.population = Some(population);
+            return Ok(server);
+        }
         let instances = scene.instances.len();
         let laying = |done| progress(Progress::Laying(done, instances));
         let points = generate_points(&scene, &pose, &tracer, &config.generate, &laying)?;
@@ -155,7 +208,7 @@ impl Server {
         publisher.publish(updater.store());
         let budget = config.bits_per_s.map(Budget::new);
         let tolerance = config.publish.precision.tolerance;
-        Ok(Server { scene, tracer, updater, publisher, budget, tolerance, dropped_inside })
+        Ok(Server { scene, tracer, updater, publisher, budget, tolerance, dropped_inside, population: None })
     }
 
     /// Brings the scene to `now_s` (seconds) and publishes what changed. Time may run in any direction. Takes as many rays
@@ -180,7 +233,18 @@ impl Server {
     ) -> Result<StepReport, ServerError> {
         let pose = self.scene.pose(now_s);
         self.tracer.update(&self.scene, &pose);
+        let (mut spawned, mut evicted) = (Vec::new(), 0);
+        if let Some(population) = &mut self.population {
+            evicted = population.turn_over(&self.scene, &mut self.updater, input)?;
+        }
         let report = self.updater.step(&self.scene, &pose, &mut self.tracer, input);
+        if let Some(population) = &mut self.population {
+            spawned = self.updater.take_ready();
+            if !spawned.is_empty() {
+                self.publisher
+                    .set_cuts(self.updater.store().layout().clone(), population.take_cuts(&spawned));
+            }
+        }
         let frame = match &mut self.budget {
             None => self.publisher.publish(self.updater.store()),
             Some(budget) => {
@@ -188,8 +252,8 @@ impl Server {
                 let most_bytes = Some(budget.allowance(sent_s));
                 let spending = Spending { most_bytes, coarseness: &coarseness };
                 let frame = self.publisher.publish_within(self.updater.store(), &spending);
-                let delta = frame.as_ref().filter(|frame| frame.kind == FrameKind::Delta);
-                budget.spend(delta.map_or(0, |frame| frame.bytes.len()));
+                let sent = frame.as_ref().filter(|frame| frame.kind != FrameKind::Snapshot);
+                budget.spend(sent.map_or(0, |frame| frame.bytes.len()));
                 frame
             }
         };
@@ -200,6 +264,9 @@ impl Server {
             counts: report.counts,
             changed: self.publisher.changed(),
             held_back: self.held_back(),
+            points: (self.updater.store().layout().len() + self.updater.spawning()) as u32,
+            spawned: spawned.len() as u32,
+            evicted,
         })
     }
 
@@ -246,6 +313,11 @@ impl Server {
     /// Points that were not laid because they lie inside geometry.
     pub fn dropped_inside(&self) -> u32 {
         self.dropped_inside
+    }
+
+    /// Instances that stay open because they alone have more points than there may be.
+    pub fn too_large(&self) -> &[u32] {
+        self.population.as_ref().map_or(&[], |population| population.too_large())
     }
 
     /// The scene.

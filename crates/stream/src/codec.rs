@@ -4,7 +4,8 @@
 //! its cell from the previous point's cell and the place within the cell; of that place one coordinate follows
 //! nearly from the other two, because points lie on surfaces whose normals are known ([`plane`]). With the layout come
 //! the cuts: which points do not count at which texels. Values, and what changed of them, are foretold from neighbours and
-//! written by an entropy coder (`values/`, `entropy/`); a delta builds on the values the receiver holds and on nothing else.
+//! written by an entropy coder (`values/`, `entropy/`); a delta builds on the values the receiver holds and on nothing else. Sets
+//! of points that come are a small snapshot of their own ([`sets`]).
 
 mod columns;
 mod decode;
@@ -13,6 +14,7 @@ mod encode;
 mod entropy;
 mod frame;
 mod plane;
+mod sets;
 mod values;
 pub(crate) mod varint;
 
@@ -20,9 +22,14 @@ pub(crate) use decode::{
     DecodedLayout, decode_changes, decode_layout, decode_values, parse_delta, parse_snapshot,
 };
 #[cfg(feature = "publish")]
-pub(crate) use encode::{EncodedLayout, delta_payload, encode_layout, snapshot_payload};
+pub(crate) use encode::{
+    EncodedLayout, append_changes, delta_payload, encode_layout, local_bits, snapshot_payload,
+};
 pub(crate) use frame::open;
 pub use frame::{FrameHeader, FrameKind, MAGIC, VERSION, seal};
+#[cfg(feature = "publish")]
+pub(crate) use sets::sets_head;
+pub(crate) use sets::{DecodedSets, decode_sets_change};
 #[cfg(feature = "publish")]
 pub(crate) use values::{Fit, Goal, LEAF, Tolerances};
 pub(crate) use values::{Near, Scratch};

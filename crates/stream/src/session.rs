@@ -1,6 +1,7 @@
 //! The order of frames: epochs, groups, joining, and what happens to a frame that comes late or twice.
 //!
-//! An *epoch* names a state of the publisher's store; a *group* is a snapshot and the deltas on top of it. Frames
+//! An *epoch* names a state of the publisher's store; a *group* is a snapshot and what builds on it: deltas, and changes of
+//! which instances have points. Frames
 //! of one group build on each other, groups do not: the newest wins.
 
 #[cfg(feature = "publish")]
@@ -9,6 +10,7 @@ mod budget;
 mod precision;
 #[cfg(feature = "publish")]
 mod publisher;
+mod sets;
 mod subscriber;
 #[cfg(feature = "publish")]
 mod within;

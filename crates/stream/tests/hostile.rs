@@ -8,7 +8,7 @@ mod cloud;
 use std::sync::LazyLock;
 
 use dapple_store::charts::{Cuts, SetCuts, SiteCut};
-use dapple_store::points::{PackedNormal, PointLayout, PointSet, PointStore};
+use dapple_store::points::{Change, PackedNormal, PointLayout, PointSet, PointStore};
 use dapple_stream::codec::seal;
 use dapple_stream::{
     Applied, DecodeError, FrameHeader, FrameKind, Limits, Publisher, PublisherConfig, ReceiveError,
@@ -31,6 +31,29 @@ static SAMPLE: LazyLock<(PointStore, Vec<u8>, Vec<u8>)> = LazyLock::new(|| {
     (store, snapshot.bytes.to_vec(), delta.bytes.to_vec())
 });
 
+/// A change of sets to epoch 13, after the delta of the sample: one goes and comes back otherwise, and one comes; with
+/// cuts and with values that change.
+static SETS: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let mut publisher = Publisher::new([1; 32], PublisherConfig::default());
+    publisher.set_cuts(SAMPLE.0.layout().clone(), cuts());
+    let now = cloud::moved(&SAMPLE.0, 4, 0.1);
+    (0..13).for_each(|epoch| drop(publisher.publish(if epoch < 12 { &SAMPLE.0 } else { &now })));
+    assert_eq!(now.layout().sets().len(), 2);
+    let gone = [1];
+    let mut sets = vec![now.layout().sets()[1].clone(), now.layout().sets()[1].clone()];
+    sets[0].origin_rest.x += 1.0;
+    sets[1].instance = 900;
+    let added = PointLayout::new(now.layout().quantum_m(), now.layout().spacing_m(), sets).unwrap();
+    let values = (0..added.len()).map(|i| i as u8).collect();
+    let mut next = now.with_sets(&gone, &PointStore::new(added.into(), values).unwrap()).unwrap();
+    let came = SetCuts { instance: 900, sites: 9, fingerprint: 4, cuts: vec![SiteCut { site: 8, mask: 3 }] };
+    publisher.set_cuts(next.layout().clone(), Cuts::new(vec![came]).unwrap());
+    let change = |point| Change { point, visibility: next.visibility()[point as usize] ^ 0x40 };
+    let changes: Vec<Change> = (30..90).map(change).collect();
+    next.apply(&changes).unwrap();
+    publisher.publish(&next).unwrap().bytes.to_vec()
+});
+
 /// Enough cuts in two sets that their sections are compressed.
 fn cuts() -> Cuts {
     let set = |instance, count: u32| {
@@ -51,11 +74,18 @@ fn holding() -> Subscriber {
     subscriber
 }
 
+/// Holds the sample after its delta.
+fn further() -> Subscriber {
+    let mut subscriber = holding();
+    subscriber.receive(&SAMPLE.2).unwrap();
+    subscriber
+}
+
 /// Receives; on an error nothing may have changed.
 fn receive(subscriber: &mut Subscriber, bytes: &[u8]) -> Result<Applied, ReceiveError> {
     let before = subscriber.clone();
     let result = subscriber.receive(bytes);
-    if !matches!(result, Ok(Applied::NewLayout | Applied::Changes(_))) {
+    if !matches!(result, Ok(Applied::NewLayout | Applied::Changes(_) | Applied::Sets { .. })) {
         assert!(before.store() == subscriber.store());
         assert_eq!((before.group(), before.epoch()), (subscriber.group(), subscriber.epoch()));
     }
@@ -71,8 +101,8 @@ proptest! {
     }
 
     #[test]
-    fn random_payloads_do_no_harm(bytes in prop::collection::vec(any::<u8>(), 0..200), snapshot: bool) {
-        let kind = if snapshot { FrameKind::Snapshot } else { FrameKind::Delta };
+    fn random_payloads_do_no_harm(bytes in prop::collection::vec(any::<u8>(), 0..200), kind in 0usize..3) {
+        let kind = [FrameKind::Snapshot, FrameKind::Delta, FrameKind::Sets][kind];
         let _ = receive(&mut holding(), &seal(kind, 0, 12, &bytes));
         let _ = receive(&mut Subscriber::new(None, Limits::default()), &seal(kind, 0, 12, &bytes));
     }
@@ -104,6 +134,23 @@ proptest! {
         let frame = seal(kind, 0, 12, &bytes);
         let mut subscriber = if delta { holding() } else { Subscriber::new(None, Limits::default()) };
         let _ = receive(&mut subscriber, &frame);
+    }
+
+    #[test]
+    fn damaged_changes_of_sets_do_no_harm(
+        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
+        cut in prop::option::weighted(0.2, any::<prop::sample::Index>()),
+    ) {
+        let mut bytes = payload(&SETS);
+        for (at, value) in &edits {
+            let range = if value % 2 == 0 { bytes.len() } else { bytes.len().min(80) };
+            let at = at.index(range);
+            bytes[at] = *value;
+        }
+        if let Some(cut) = cut {
+            bytes.truncate(cut.index(bytes.len()));
+        }
+        let _ = receive(&mut further(), &seal(FrameKind::Sets, 0, 13, &bytes));
     }
 }
 
@@ -210,4 +257,72 @@ fn rules_of_the_format_are_enforced() {
     assert!(reason(delta(&good[..good.len() / 2])).contains("changes: end early"));
     assert!(reason(delta(&[2, 1, 58])).contains("changes: end early"));
     assert!(reason(delta(&[2, 1, 58, 0xff, 0xff, 0xff, 0xff])).contains("changes: are none"));
+}
+
+/// Changes of sets, each of which breaks one rule.
+#[test]
+fn rules_of_changes_of_sets_are_enforced() {
+    let sets = |payload: &[u8]| further().receive(&seal(FrameKind::Sets, 0, 13, payload));
+    let good = payload(&SETS);
+    let applied = sets(&good).unwrap();
+    assert!(
+        matches!(&applied, Applied::Sets { removed, added, changes }
+            if removed == &[1] && added == &[1, 900] && changes.len() > 20),
+        "{applied:?}"
+    );
+    assert!(further().receive(&SETS).is_ok());
+    let reason = |result: Result<Applied, ReceiveError>| result.unwrap_err().to_string();
+    // 1 epoch back; one goes: instance 1.
+    assert_eq!(good[..3], [1, 1, 1]);
+    let size = usize::from(good[3] & 0x7f) | usize::from(good[4]) << 7;
+    let (layout, values) = good[5..].split_at(size);
+    let made = |gone: &[u8], layout: &[u8], rest: &[u8]| {
+        let long = [layout.len() as u8 & 0x7f | 0x80, (layout.len() >> 7) as u8];
+        let size = if layout.len() < 0x80 { vec![layout.len() as u8] } else { long.to_vec() };
+        reason(sets(&[&[1], gone, &size[..], layout, rest].concat()))
+    };
+    let with = |at: usize, bytes: &[u8]| {
+        let mut layout = layout.to_vec();
+        layout.splice(at..at + bytes.len(), bytes.iter().copied());
+        made(&[1, 1], &layout, values)
+    };
+    assert!(made(&[1, 99], layout, values).contains("sets that go: are not there"));
+    assert!(made(&[127, 0], layout, values).contains("are more than there are"));
+    assert!(made(&[0], layout, values).contains("sets that come: are there already"), "1 has not gone");
+    assert!(with(0, &1f32.to_le_bytes()).contains("other lengths"), "quantum");
+    assert!(with(4, &1f32.to_le_bytes()).contains("other lengths"), "spacing");
+    assert!(with(8, &[4]).contains("other lengths") || with(8, &[4]).contains("frame: "), "local bits");
+    let empty = [&layout[..9], &[0, 0]].concat();
+    let says = made(&[1, 1], &empty, &[0]);
+    assert!(says.contains("are none"), "{says}");
+    assert!(reason(sets(&[1, 0, 0])).contains("neither come nor go"));
+    assert!(matches!(sets(&[1, 1, 1, 0]), Ok(Applied::Sets { removed, .. }) if removed == [1]));
+    assert!(reason(sets(&[1, 1, 1, 0, 1])).contains("share: ends early"));
+    assert!(reason(sets(&[1, 1, 1, 0, 1, 58])).contains("changes: end early"));
+    assert!(reason(sets(&[0, 1, 1, 0])).contains("is the frame's own"));
+    assert!(reason(sets(&[2, 1, 1, 0])).contains("ask for a snapshot"));
+    let error = Subscriber::new(None, Limits::default()).receive(&SETS).unwrap_err();
+    assert!(matches!(error, ReceiveError::NeedSnapshot { held: None, .. }));
+    // The limits are for all that is held afterwards.
+    let mut held = further();
+    held.receive(&SETS).unwrap();
+    let (points, sets) = (held.store().unwrap().layout().len(), held.store().unwrap().layout().sets().len());
+    let at_most = |limits: Limits| {
+        let mut subscriber = Subscriber::new(None, limits);
+        subscriber.receive(&SAMPLE.1).unwrap();
+        subscriber.receive(&SAMPLE.2).unwrap();
+        subscriber.receive(&SETS)
+    };
+    let before = further().store().unwrap().layout().len();
+    let exact = Limits {
+        max_points: points.max(before) as u32,
+        max_sets: sets as u32,
+        max_cuts: 600,
+        ..Limits::default()
+    };
+    assert!(at_most(exact).is_ok());
+    if points > before {
+        let less = Limits { max_points: points as u32 - 1, ..exact };
+        assert!(matches!(at_most(less), Err(ReceiveError::Decode(DecodeError::TooLarge { .. }))));
+    }
 }

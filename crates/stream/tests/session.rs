@@ -7,7 +7,8 @@ mod common;
 mod random;
 
 use common::same_bits;
-use dapple_store::points::{Change, PointStore};
+use dapple_store::charts::{Cuts, SetCuts, SiteCut};
+use dapple_store::points::{Change, PointLayout, PointStore};
 use dapple_stream::{
     Applied, Frame, FrameKind, IgnoreReason, Limits, Precision, Publisher, PublisherConfig, ReceiveError,
     Subscriber,
@@ -30,17 +31,21 @@ enum Step {
     Still,
     /// Another layout.
     Layout(PointStore),
+    /// Sets of the pool at these places come, or go if they are there; and some values change.
+    Sets(Vec<prop::sample::Index>, Vec<(prop::sample::Index, u8)>),
     /// The publisher is asked for a new group.
     Group,
 }
 
 fn steps() -> impl Strategy<Value = Vec<Step>> {
     let change = prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..40);
+    let sets = (prop::collection::vec(any::<prop::sample::Index>(), 1..4), change.clone());
     prop::collection::vec(
         prop_oneof![
             8 => change.prop_map(Step::Change),
             2 => Just(Step::Still),
             1 => stores().prop_map(Step::Layout),
+            3 => sets.prop_map(|(places, changes)| Step::Sets(places, changes)),
             1 => Just(Step::Group),
         ],
         0..25,
@@ -52,27 +57,65 @@ struct Run {
     states: Vec<PointStore>,
     frames: Vec<Vec<Frame>>,
     joins: Vec<Frame>,
+    /// Frames that say which sets come and go.
+    sets: usize,
+}
+
+fn change(store: &mut PointStore, changes: &[(prop::sample::Index, u8)]) {
+    let points = store.visibility().len();
+    let change = |(at, value): &(prop::sample::Index, u8)| Change {
+        point: if points == 0 { 0 } else { at.index(points) as u32 },
+        visibility: *value,
+    };
+    let changes: Vec<Change> = changes.iter().map(change).take(points).collect();
+    store.apply(&changes).unwrap();
+}
+
+/// Lets sets go that are there, and others come: of each instance always the same points, with values by their number.
+fn toggle(store: &mut PointStore, places: &[prop::sample::Index]) {
+    for place in places {
+        let instance = 7 * place.index(9) as u32;
+        let quantum = store.layout().quantum_m();
+        let held = store.layout().set_of_instance(instance).is_some();
+        let count = instance * 3 % 50;
+        let points =
+            (0..count).map(|i| ([i * i % 90, i, instance], [127, (instance + i / 9) as u8])).collect();
+        let sets = vec![common::set(instance, [instance as f32, 0.0, -0.0], points)];
+        let added = PointLayout::new(quantum, store.layout().spacing_m(), sets).unwrap();
+        let values = (0..count).map(|i| (255 - i) as u8).collect();
+        let added = PointStore::new(added.into(), values).unwrap();
+        *store = match held {
+            true => store.with_sets(&[instance], &PointStore::default()).unwrap(),
+            false => store.with_sets(&[], &added).unwrap(),
+        };
+    }
+}
+
+/// Cuts of every third instance, and of none of the others.
+fn cuts_of(layout: &PointLayout) -> Cuts {
+    let instances = layout.sets().iter().map(|set| set.instance).filter(|i| i % 3 == 0);
+    let cuts = |instance: u32| vec![SiteCut { site: instance % 5, mask: 1 + (instance % 9) as u16 }];
+    let set = |instance| SetCuts { instance, sites: 5, fingerprint: !instance, cuts: cuts(instance) };
+    Cuts::new(instances.map(set).collect()).unwrap()
 }
 
 fn run(start: &PointStore, steps: &[Step], config: PublisherConfig) -> Run {
     let mut publisher = Publisher::new(SCENE, config);
     assert!(publisher.join().is_none());
     let mut store = start.clone();
-    let mut run = Run { states: Vec::new(), frames: Vec::new(), joins: Vec::new() };
+    let mut run = Run { states: Vec::new(), frames: Vec::new(), joins: Vec::new(), sets: 0 };
     for (index, step) in std::iter::once(&Step::Still).chain(steps).enumerate() {
         let mut frames = Vec::new();
         match step {
-            Step::Change(changes) if !store.visibility().is_empty() => {
-                let points = store.visibility().len();
-                let changes: Vec<Change> = changes
-                    .iter()
-                    .map(|(at, value)| Change { point: at.index(points) as u32, visibility: *value })
-                    .collect();
-                store.apply(&changes).unwrap();
+            Step::Change(changes) => change(&mut store, changes),
+            Step::Sets(places, changes) => {
+                toggle(&mut store, places);
+                change(&mut store, changes);
+                publisher.set_cuts(store.layout().clone(), cuts_of(store.layout()));
             }
             Step::Layout(other) => store = other.clone(),
             Step::Group => frames.extend(publisher.start_group()),
-            Step::Change(_) | Step::Still => {}
+            Step::Still => {}
         }
         frames.extend(publisher.publish(&store));
         if matches!(step, Step::Still) && index > 0 {
@@ -83,6 +126,7 @@ fn run(start: &PointStore, steps: &[Step], config: PublisherConfig) -> Run {
         assert!(held.visibility().iter().zip(store.visibility()).all(|(a, b)| a.abs_diff(*b) <= tolerance));
         assert!(tolerance > 0 || same_bits(held, &store));
         run.states.push(held.clone());
+        run.sets += frames.iter().filter(|frame| frame.kind == FrameKind::Sets).count();
         run.frames.push(frames);
         run.joins.push(publisher.join().expect("something is published"));
     }
@@ -118,8 +162,18 @@ proptest! {
                 let before = late.store().unwrap().clone();
                 let applied = late.receive(&frame.bytes).unwrap();
                 prop_assert_eq!((late.group(), late.epoch()), (Some(frame.group), Some(frame.epoch)));
-                if let Applied::Changes(changes) = applied {
-                    let mut redone = before;
+                let redone = match applied {
+                    Applied::Sets { removed, added, changes } => {
+                        // What came, with its values; what stays is redone from what was.
+                        let now = late.store().unwrap();
+                        let came = now.layout().only(&added);
+                        let came = PointStore::default().carried(came.into(), now);
+                        Some((before.with_sets(&removed, &came).unwrap(), changes))
+                    }
+                    Applied::Changes(changes) => Some((before, changes)),
+                    _ => None,
+                };
+                if let Some((mut redone, changes)) = redone {
                     for change in &changes {
                         prop_assert_eq!(redone.visibility()[change.point as usize], change.old);
                         prop_assert_ne!(change.old, change.new);
@@ -132,6 +186,9 @@ proptest! {
             }
             prop_assert!(same_bits(late.store().unwrap(), state));
         }
+        let mut joiner = subscriber();
+        joiner.receive(&run.joins.last().unwrap().bytes).unwrap();
+        prop_assert_eq!(late.cuts(), joiner.cuts());
         prop_assert_eq!(late.epoch(), Some(run.joins.last().unwrap().epoch));
     }
 
@@ -213,6 +270,21 @@ proptest! {
     }
 
     #[test]
+    fn sets_that_share_a_layout_are_told_by_what_differs(
+        start in stores(), sets in prop::collection::vec(any::<prop::sample::Index>(), 1..4), config in config(),
+    ) {
+        let config = PublisherConfig { deltas_per_group: 0, ..config };
+        let steps = [Step::Sets(sets, Vec::new())];
+        let run = run(&start, &steps, config);
+        let (old, new) = (run.states[0].layout(), run.states[1].layout());
+        let stays = |set: &dapple_store::points::PointSet| {
+            !set.is_empty() && old.set_of_instance(set.instance).is_some_and(|other| other.len() == set.len())
+        };
+        let expected = usize::from(old != new && new.sets().iter().any(stays));
+        prop_assert_eq!(run.sets, expected);
+    }
+
+    #[test]
     fn the_same_history_gives_the_same_bytes(start in stores(), steps in steps(), config in config()) {
         let (a, b) = (run(&start, &steps, config), run(&start, &steps, config));
         prop_assert_eq!(a.frames, b.frames);
@@ -283,4 +355,51 @@ fn another_scene_is_refused() {
     let mut any = Subscriber::new(None, Limits::default());
     any.receive(&frame.bytes).unwrap();
     assert_eq!(any.scene_hash(), Some([9; 32]));
+}
+
+#[test]
+fn sets_that_come_and_go_are_a_small_frame_and_what_stays_is_kept() {
+    let big = |instance: u32| {
+        let points = (0..3000).map(|i| ([i % 60 * 30, i / 60 * 29, instance], [127, 254])).collect();
+        common::set(instance, [0.0; 3], points)
+    };
+    let little = || common::set(4, [1.0; 3], (0..90).map(|i| ([i * 9, 7, i], [9, 140])).collect());
+    let store = |sets: Vec<_>, value| {
+        let layout = PointLayout::new(0.002, 0.064, sets).unwrap();
+        let values = vec![value; layout.len()];
+        PointStore::new(layout.into(), values).unwrap()
+    };
+    let mut publisher = Publisher::new(SCENE, PublisherConfig::default());
+    let mut live = subscriber();
+    let first = publisher.publish(&store(vec![big(1), big(2)], 200)).unwrap();
+    live.receive(&first.bytes).unwrap();
+    // A set comes, another goes, and one point of the third changes.
+    let mut next = store(vec![big(2), little()], 200);
+    next.apply(&[Change { point: 5, visibility: 9 }]).unwrap();
+    let frame = publisher.publish(&next).unwrap();
+    assert_eq!((frame.kind, frame.group, frame.epoch), (FrameKind::Sets, first.group, 1));
+    assert!(
+        frame.bytes.len() < 600 && first.bytes.len() > 3000,
+        "{}, {}",
+        frame.bytes.len(),
+        first.bytes.len()
+    );
+    assert_eq!(publisher.changed(), 91);
+    let changes = vec![dapple_stream::ValueChange { point: 5, old: 200, new: 9 }];
+    let expected = Applied::Sets { removed: vec![1], added: vec![4], changes };
+    assert_eq!(live.receive(&frame.bytes), Ok(expected));
+    assert!(same_bits(live.store().unwrap(), &next));
+    // The present snapshot brings who saw nothing of it to the same store, and tells what of the old one stays.
+    let mut late = subscriber();
+    late.receive(&first.bytes).unwrap();
+    let joined = late.receive(&publisher.join().unwrap().bytes).unwrap();
+    assert!(matches!(joined, Applied::Sets { removed, added, .. } if removed == [1] && added == [4]));
+    assert!(same_bits(late.store().unwrap(), &next));
+    // A new group of the same layout is only changes to who followed.
+    let layout = live.store().unwrap().layout().clone();
+    let again = publisher.start_group().unwrap();
+    assert_eq!(live.receive(&again.bytes), Ok(Applied::Changes(vec![])));
+    assert!(std::sync::Arc::ptr_eq(&layout, live.store().unwrap().layout()));
+    // Nothing in common: a snapshot, as ever.
+    assert_eq!(publisher.publish(&store(vec![big(9)], 1)).unwrap().kind, FrameKind::Snapshot);
 }

@@ -57,6 +57,18 @@ fn changes() -> [Change; 2] {
     [Change { point: 1, visibility: 240 }, Change { point: 4, visibility: 70 }]
 }
 
+/// What the document describes at epoch 8, and the cuts of it.
+fn with_other_sets() -> (PointStore, Cuts) {
+    let points = vec![([0, 0, 0], [127, 254]), ([31, 0, 0], [127, 254])];
+    let mut sets = described().layout().sets()[..1].to_vec();
+    sets.push(common::set(5, [0.0, 0.0, 3.0], points));
+    let layout = PointLayout::new(0.001953125, 0.0625, sets).unwrap();
+    let store = PointStore::new(layout.into(), vec![200, 240, 128, 0, 100, 90]).unwrap();
+    let came =
+        SetCuts { instance: 5, sites: 4, fingerprint: 0x89ab_cdef, cuts: vec![SiteCut { site: 2, mask: 1 }] };
+    (store, cuts().with_sets(&[2], &Cuts::new(vec![came]).unwrap()))
+}
+
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x} ")).collect()
 }
@@ -75,6 +87,14 @@ fn the_vectors_decode_to_what_is_described() {
     expected.apply(&changes()).unwrap();
     assert!(common::same_bits(subscriber.store().unwrap(), &expected));
     assert_eq!((subscriber.group(), subscriber.epoch()), (Some(300), Some(7)));
+
+    let changes = vec![ValueChange { point: 0, old: 255, new: 200 }];
+    let applied = Applied::Sets { removed: vec![2], added: vec![5], changes };
+    assert_eq!(subscriber.receive(&vector("sets")), Ok(applied));
+    let (expected, cuts) = with_other_sets();
+    assert!(common::same_bits(subscriber.store().unwrap(), &expected));
+    assert_eq!(subscriber.cuts(), Some(&cuts));
+    assert_eq!((subscriber.group(), subscriber.epoch()), (Some(300), Some(8)));
 }
 
 /// The chances that a delta begins with are those of the document.
@@ -100,6 +120,10 @@ fn encoding_gives_the_vectors() {
     store.apply(&changes()).unwrap();
     let delta = publisher.publish(&store).unwrap();
     assert_eq!(hex(&vector("delta")), hex(&delta.bytes));
+    let (other, cuts) = with_other_sets();
+    publisher.set_cuts(other.layout().clone(), cuts);
+    let sets = publisher.publish(&other).unwrap();
+    assert_eq!(hex(&vector("sets")), hex(&sets.bytes));
 }
 
 /// 64 points in a row, all of which go from 0 to 1.

@@ -48,7 +48,7 @@ pub(crate) struct EvalArgs {
     #[arg(long, conflicts_with_all = [
         "scenes", "builtin", "suite", "detail", "animation", "methods", "frames", "size", "points", "hz", "path",
         "seconds", "reference_rays", "supersample", "radius", "point_rays", "threshold", "seed", "ray_budget",
-        "rays_still", "budget", "preset", "hdr_flip", "record", "ppd",
+        "rays_still", "budget", "preset", "max_points", "hdr_flip", "record", "ppd",
     ])]
     pub(crate) smoke: bool,
     /// Threads; 0 is one for each core.
@@ -148,6 +148,10 @@ pub(crate) struct Options {
     /// Points, updates a second and budget that fit a device, where they are not given.
     #[arg(long, value_enum)]
     pub(crate) preset: Option<Preset>,
+    /// Most points at a time: those of whole instances come when the camera sees them, and go when others need the room
+    /// [default: all points of all instances are there throughout].
+    #[arg(long, value_name = "N")]
+    pub(crate) max_points: Option<u32>,
     /// Also compute HDR-FLIP, on linear light before tone mapping (several times the work of FLIP).
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL")]
     pub(crate) hdr_flip: Option<bool>,
@@ -177,6 +181,7 @@ impl Options {
             rays_still: self.rays_still.or(other.rays_still),
             budget: self.budget.or(other.budget),
             preset: self.preset.or(other.preset),
+            max_points: self.max_points.or(other.max_points),
             hdr_flip: self.hdr_flip.or(other.hdr_flip),
         }
     }

@@ -51,7 +51,7 @@ const fn cost(key: &'static str, title: &'static str, unit: &'static str, digits
 pub(super) const VISIBILITY: &str = "visibility_psnr_db";
 
 /// All columns after those that name a row: first what most look for.
-pub(super) const COLUMNS: [Column; 17] = [
+pub(super) const COLUMNS: [Column; 18] = [
     Column {
         explanation: "PSNR of visibility against the truth over all pixels that show geometry; the mean squared error is \
             pooled over the pictures",
@@ -140,6 +140,12 @@ pub(super) const COLUMNS: [Column; 17] = [
         ..cost("backlog", "backlog", "", 0)
     },
     Column {
+        explanation: "most points at a time, where there is a cap on them",
+        kind: Kind::Other,
+        get: |row| row.steps?.most_points.map(|points| exact(points as f64)),
+        ..cost("most_points", "at a time", "", 0)
+    },
+    Column {
         explanation: "mean wall time of a server step: pose, trees, rays, encoding; differs from run to run",
         get: |row| row.times.server_ms.map(exact),
         ..cost("server_ms", "server", "ms", 2)
@@ -218,7 +224,7 @@ pub(super) fn bytes(count: u64) -> String {
 /// always, the rest where it differs.
 pub(super) fn settings(case: &Case) -> Vec<Setting> {
     type Part = (&'static str, bool, fn(&Params) -> Option<String>);
-    const PARTS: [Part; 8] = [
+    const PARTS: [Part; 9] = [
         ("points_per_m2", true, |p| p.points_per_m2.map(|n| format!("N {n}"))),
         ("hz", true, |p| p.hz.map(|hz| format!("{hz} Hz"))),
         ("rays_per_pixel", true, |p| p.rays_per_pixel.map(|rays| format!("{rays} rays"))),
@@ -227,6 +233,9 @@ pub(super) fn settings(case: &Case) -> Vec<Setting> {
         ("ray_budget", false, |p| p.ray_budget.map(|rays| format!("{} rays a step", number(rays as f64, 0)))),
         ("budget_kbit_per_s", false, |p| p.budget_kbit_per_s.map(|kbit| format!("at most {}", bits(kbit)))),
         ("rays_still", false, |p| p.rays_still.map(|rays| format!("{rays} rays at rest"))),
+        ("max_points", false, |p| {
+            p.max_points.map(|points| format!("at most {} points", number(points.into(), 0)))
+        }),
     ];
     let of_row = |row: &Row| {
         let others = || case.rows.iter().filter(|other| other.method == row.method);

@@ -69,11 +69,13 @@ pub(super) struct AnyStep {
     pub(super) rays: u64,
     /// Points whose changes wait for bits.
     pub(super) held_back: u32,
+    /// Points that there are, and of how many instances they came and went; of a server whose points can.
+    pub(super) sets: Option<[u32; 3]>,
 }
 
 impl AnyStep {
     fn new(bytes: Option<Arc<[u8]>>, counts: StepCounts) -> AnyStep {
-        AnyStep { packet: bytes.map(Packet::from), rays: counts.rays(), counts, held_back: 0 }
+        AnyStep { packet: bytes.map(Packet::from), rays: counts.rays(), counts, held_back: 0, sets: None }
     }
 }
 
@@ -164,7 +166,8 @@ impl AnyServer {
             AnyServer::Own(server) => {
                 let report = server.step_at(time_s, sent_s, input)?;
                 let step = AnyStep::new(report.frame.map(|frame| frame.bytes), report.counts);
-                Ok(AnyStep { held_back: report.held_back, ..step })
+                let sets = Some([report.points, report.spawned, report.evicted]);
+                Ok(AnyStep { held_back: report.held_back, sets, ..step })
             }
             AnyServer::Paper(server) => {
                 let size = stage.settings.size;
@@ -177,7 +180,13 @@ impl AnyServer {
             AnyServer::Sas(server) => {
                 let step = server.step(time_s, &camera_at(stage, time_s))?;
                 let packet = step.frame.as_ref().map(Packet::from);
-                Ok(AnyStep { packet, counts: StepCounts::default(), rays: step.rays, held_back: 0 })
+                Ok(AnyStep {
+                    packet,
+                    counts: StepCounts::default(),
+                    rays: step.rays,
+                    held_back: 0,
+                    sets: None,
+                })
             }
         }
     }

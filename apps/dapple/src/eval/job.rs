@@ -149,7 +149,7 @@ impl Job {
         let mut pair = match self {
             Job::Points { points_per_m2, hz, .. } => {
                 let start = Start::new(stage, *points_per_m2);
-                let server = starts.server(stage.loaded, &start, &|part| progress(0.3 * part))?;
+                let server = starts.server(stage, *hz, &start, &|part| progress(0.3 * part))?;
                 let server = AnyServer::new(
                     server,
                     self.is_paper(),
@@ -380,6 +380,7 @@ impl Line {
                 .and_then(|p| p.points_per_m2)
                 .and(settings.step.budget)
                 .map(|budget| budget.0 as f64 / 1e3),
+            max_points: pair.and_then(|p| p.points_per_m2).and(settings.step.max_points),
             rays_per_pixel: match self.method {
                 Method::Rtao { rays } => Some(rays),
                 _ => None,

@@ -15,7 +15,6 @@ use super::results::Steps;
 use super::stage::Stage;
 use crate::args::StepArgs;
 use crate::light::microseconds;
-use crate::source::Loaded;
 
 /// Servers at their start are kept for other rates and paths while they have no more points than this together.
 const MAX_KEPT_POINTS: usize = 6_000_000;
@@ -28,6 +27,7 @@ pub(super) struct Start {
     /// What values may be off, 255ths.
     pub(super) tolerance: u8,
     pub(super) seed: u32,
+    pub(super) max_points: Option<u32>,
 }
 
 impl Start {
@@ -42,6 +42,7 @@ impl Start {
             },
             tolerance: settings.threshold,
             seed: settings.seed,
+            max_points: settings.step.max_points,
         }
     }
 
@@ -53,7 +54,13 @@ impl Start {
         };
         let precision = Precision { tolerance: self.tolerance, ..Precision::default() };
         let publish = PublisherConfig { precision, ..PublisherConfig::default() };
-        ServerConfig { generate, update: self.update, publish, ..ServerConfig::default() }
+        ServerConfig {
+            generate,
+            update: self.update,
+            publish,
+            max_resident_points: self.max_points,
+            ..ServerConfig::default()
+        }
     }
 
     /// Whether a server would refuse these settings; quick.
@@ -84,16 +91,35 @@ impl Starts {
     /// A server at its start; `progress` gets the part that is done.
     pub(super) fn server(
         &mut self,
-        loaded: &Loaded,
+        stage: &Stage<'_>,
+        hz: f64,
         start: &Start,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Server> {
         if let Some((_, server)) = self.kept.iter().find(|(kept, _)| kept == start) {
             return Ok(server.clone());
         }
-        let scene = &loaded.scene;
+        let scene = &stage.loaded.scene;
         let config = start.config();
         let part = |done: usize, of: usize| done as f64 / of.max(1) as f64;
+        let start_progress = |p| match p {
+            Progress::Laying(done, of) => progress(0.3 * part(done, of)),
+            Progress::Tracing(done, of) => progress(0.3 + 0.5 * part(done, of)),
+            Progress::Cutting(done, of) => progress(0.8 + 0.2 * part(done, of)),
+        };
+        if start.max_points.is_some() {
+            // What is there at the start depends on where the path looks.
+            let seen = seen(0.0, hz, stage);
+            let input = StepInput { interest: &seen, ..StepInput::default() };
+            let server = Server::watched(scene.clone(), &config, &input, &start_progress)?;
+            if !server.too_large().is_empty() {
+                tracing::warn!(
+                    "--max-points: {} instances alone have more points and stay open",
+                    server.too_large().len()
+                );
+            }
+            return Ok(server);
+        }
         let instances = scene.instances.len();
         let laid = |done| progress(0.3 * part(done, instances));
         let points = generate_points(scene, &self.rest_pose, &self.tracer, &config.generate, &laid)?;
@@ -103,11 +129,7 @@ impl Starts {
             self.tracer.clone(),
             points,
             &config,
-            &|p| match p {
-                Progress::Laying(done, of) => progress(0.3 * part(done, of)),
-                Progress::Tracing(done, of) => progress(0.3 + 0.5 * part(done, of)),
-                Progress::Cutting(done, of) => progress(0.8 + 0.2 * part(done, of)),
-            },
+            &start_progress,
         )?;
         let points = |server: &Server| server.store().layout().len();
         while !self.kept.is_empty()
@@ -209,13 +231,16 @@ impl Pair {
                 return Ok(changed);
             }
             let start = Instant::now();
-            let interest = interest(tick_s, self.hz, &self.step, stage);
-            let input = StepInput { ray_budget: self.step.ray_budget, interest: &interest };
+            let seen = self.seen(tick_s, stage);
+            let input = self.input(&seen);
             let report = self.server.step((tick_s, tick_s), &input, stage)?;
             self.clock_s = tick_s;
             self.server_seconds += start.elapsed().as_secs_f64();
             self.rays += report.rays;
             self.steps.add(&report.counts);
+            if let (Some(_), Some([points, spawned, evicted])) = (self.step.max_points, report.sets) {
+                self.steps.add_sets(points, spawned, evicted);
+            }
             let start = Instant::now();
             let mut bytes = 0;
             if let Some(packet) = &report.packet {
@@ -234,14 +259,27 @@ impl Pair {
 
     /// Steps once with the scene at `time_s`, uncounted.
     pub(super) fn step_at(&mut self, time_s: f64, stage: &Stage<'_>) -> Result<StepAt> {
-        let interest = interest(time_s, self.hz, &self.step, stage);
-        let input = StepInput { ray_budget: self.step.ray_budget, interest: &interest };
+        let seen = self.seen(time_s, stage);
+        let input = self.input(&seen);
         self.clock_s += 1.0 / self.hz;
         let report = self.server.step((time_s, self.clock_s), &input, stage)?;
         if let Some(packet) = &report.packet {
             self.client.receive(packet).context("the client refused the server's frame")?;
         }
         Ok(StepAt { changed: report.packet.is_some(), backlog: report.counts.backlog.max(report.held_back) })
+    }
+
+    /// What the viewer sees by the next tick, where a budget or a cap asks for it.
+    fn seen(&self, tick_s: f64, stage: &Stage<'_>) -> Vec<ConvexVolume> {
+        let StepArgs { ray_budget, budget, max_points, .. } = self.step;
+        match ray_budget.is_some() || budget.is_some() || max_points.is_some() {
+            true => seen(tick_s, self.hz, stage),
+            false => Vec::new(),
+        }
+    }
+
+    fn input<'a>(&self, seen: &'a [ConvexVolume]) -> StepInput<'a> {
+        StepInput { ray_budget: self.step.ray_budget, interest: seen }
     }
 
     pub(super) fn cut_bytes(&self) -> u64 {
@@ -256,11 +294,8 @@ impl Pair {
     }
 }
 
-/// What the viewer sees by the next tick, where a budget asks for it.
-fn interest(tick_s: f64, hz: f64, step: &StepArgs, stage: &Stage<'_>) -> Vec<ConvexVolume> {
-    if step.ray_budget.is_none() && step.budget.is_none() {
-        return Vec::new();
-    }
+/// What the viewer sees by the next tick.
+fn seen(tick_s: f64, hz: f64, stage: &Stage<'_>) -> Vec<ConvexVolume> {
     let scene = stage.scene();
     let path: &CameraPath = &stage.path;
     let size = stage.settings.size;

@@ -189,9 +189,24 @@ pub(crate) struct Steps {
     pub(crate) rays_full: u64,
     pub(crate) rays_movers: u64,
     pub(crate) rays_refined: u64,
+    /// Where there is a cap on points: most points at a time, those that wait for their first rays counted; and how many instances'
+    /// points came and went.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) most_points: Option<u64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) spawned: Option<u64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) evicted: Option<u64>,
 }
 
 impl Steps {
+    /// Points of a step, and instances that came and went.
+    pub(crate) fn add_sets(&mut self, points: u32, spawned: u32, evicted: u32) {
+        self.most_points = self.most_points.max(Some(points.into()));
+        self.spawned = Some(self.spawned.unwrap_or(0) + u64::from(spawned));
+        self.evicted = Some(self.evicted.unwrap_or(0) + u64::from(evicted));
+    }
+
     pub(crate) fn add(&mut self, counts: &StepCounts) {
         self.selected += u64::from(counts.selected);
         self.traced_full += u64::from(counts.traced_full);
@@ -222,6 +237,7 @@ pub(crate) struct Params {
     pub(crate) rays_still: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) budget_kbit_per_s: Option<f64>,
+    pub(crate) max_points: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) rays_per_pixel: Option<u32>,
 }

@@ -311,6 +311,7 @@ impl Run<'_> {
             "points": [settings.point_rays, u32::from(settings.threshold), settings.step.rays_still],
             "ray_budget": settings.step.ray_budget,
             "budget": settings.step.budget.map(|budget| budget.0),
+            "max_points": settings.step.max_points,
             "hdr_flip": settings.hdr_flip,
             // Says how long flicker is watched.
             "slowest_hz": settings.slowest_hz(),

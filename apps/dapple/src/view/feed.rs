@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError};
 
 use anyhow::{Context, Result, anyhow, bail};
-use dapple_scene::{Scene, SceneHash};
+use dapple_scene::{PosedCamera, Scene, SceneHash};
 use dapple_stream::{FrameHeader, Limits, Recording, Replay};
 
 use super::fetch::Piece;
@@ -132,6 +132,13 @@ impl Feed {
                 *self = Feed::None;
                 Err(error)
             }
+        }
+    }
+
+    /// Says how the viewer looks.
+    pub(super) fn look(&mut self, camera: &PosedCamera) {
+        if let Feed::Live(live) = self {
+            live.look(camera);
         }
     }
 

@@ -40,6 +40,7 @@ pub(super) fn run(args: &ViewArgs, opening: Opening) -> Result<()> {
         let time_s = args.time + span_s * f64::from(number) / f64::from(args.frames);
         show.clock.seek(time_s);
         let time_s = show.clock.time_s();
+        show.look();
         for frame in receive(&mut show, time_s)? {
             frame_bytes += frame.len();
             show.receive(&frame, time_s)?;

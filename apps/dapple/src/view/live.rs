@@ -5,23 +5,26 @@ use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
-use dapple_scene::Scene;
+use dapple_scene::{PosedCamera, Scene};
 use dapple_server::{Progress, Server, ServerConfig};
-use dapple_trace::psao::update::StepInput;
+use dapple_trace::psao::update::{ConvexVolume, StepInput};
 
 /// What is asked of the server.
 enum Request {
-    /// Bring the scene to this time, seconds.
-    Time(f64),
+    /// Bring the scene to this time, seconds, as the viewer looks at it.
+    Time(f64, Option<ConvexVolume>),
     /// Send a snapshot, for a viewer that joins.
     Join,
 }
+
+/// Wider than pictures are, so that the server need not know their shape.
+const ASPECT: f32 = 2.4;
 
 /// What it answers.
 enum Reply {
     Progress(Progress),
     Frame(Arc<[u8]>),
-    Stepped { seconds: f64, traced: u32 },
+    Stepped { seconds: f64, traced: u32, busy: bool },
     Failed(String),
 }
 
@@ -44,6 +47,13 @@ pub(super) struct Live {
     tick: Option<i64>,
     /// Ticks that it was asked for and has not answered.
     in_flight: u32,
+    /// Points come and go with what is looked at.
+    is_capped: bool,
+    /// The last step did something, so the next one may as well, although nothing moves.
+    is_busy: bool,
+    /// As the viewer looks, and as it looked when the server was last asked.
+    look: Option<ConvexVolume>,
+    asked_look: Option<ConvexVolume>,
     /// What the last step took, seconds, and the points it traced.
     pub(super) step_seconds: f64,
     pub(super) traced: u32,
@@ -57,6 +67,7 @@ impl Live {
         hz: f64,
         ray_budget: Option<u64>,
     ) -> Result<Live> {
+        let is_capped = config.max_resident_points.is_some();
         let (requests, asked) = channel();
         let (answers, replies) = channel();
         // One core is left to the picture.
@@ -76,6 +87,10 @@ impl Live {
             start: Start::Doing("laying points", 0.0),
             tick: None,
             in_flight: 0,
+            is_capped,
+            is_busy: false,
+            look: None,
+            asked_look: None,
             step_seconds: 0.0,
             traced: 0,
         })
@@ -83,6 +98,13 @@ impl Live {
 
     pub(super) fn progress(&self) -> &Start {
         &self.start
+    }
+
+    /// Says how the viewer looks from now on.
+    pub(super) fn look(&mut self, camera: &PosedCamera) {
+        if self.is_capped {
+            self.look = Some(ConvexVolume::frustum(camera, ASPECT, f32::INFINITY, 0.0));
+        }
     }
 
     /// Asks for a snapshot.
@@ -107,7 +129,9 @@ impl Live {
             }
         }
         let tick = self.tick_at(time_s);
-        if self.start == Start::Done && self.in_flight == 0 && self.tick != Some(tick) {
+        let differs =
+            self.tick != Some(tick) || self.look != self.asked_look || self.is_capped && self.is_busy;
+        if self.start == Start::Done && self.in_flight == 0 && differs {
             self.ask(tick);
         }
         frames
@@ -136,9 +160,10 @@ impl Live {
     }
 
     fn ask(&mut self, tick: i64) {
-        if self.requests.send(Request::Time(tick as f64 / self.hz)).is_ok() {
+        if self.requests.send(Request::Time(tick as f64 / self.hz, self.look.clone())).is_ok() {
             self.in_flight += 1;
             self.tick = Some(tick);
+            self.asked_look.clone_from(&self.look);
         }
     }
 
@@ -163,8 +188,9 @@ impl Live {
                 self.start = Start::Done;
                 return Some(bytes);
             }
-            Reply::Stepped { seconds, traced } => {
+            Reply::Stepped { seconds, traced, busy } => {
                 self.in_flight = self.in_flight.saturating_sub(1);
+                self.is_busy = busy;
                 (self.step_seconds, self.traced) = (seconds, traced);
             }
             Reply::Failed(reason) => self.start = Start::Failed(reason),
@@ -205,11 +231,13 @@ fn run(
     while let Ok(request) = asked.recv() {
         let frame = match request {
             Request::Join => server.join()?,
-            Request::Time(time_s) => {
+            Request::Time(time_s, look) => {
                 let start = Instant::now();
-                let report = server.step_with(time_s, input)?;
-                let stepped =
-                    Reply::Stepped { seconds: start.elapsed().as_secs_f64(), traced: report.traced };
+                let input = StepInput { interest: look.as_slice(), ..*input };
+                let report = server.step_with(time_s, &input)?;
+                let (seconds, busy) =
+                    (start.elapsed().as_secs_f64(), report.frame.is_some() || report.rays > 0);
+                let stepped = Reply::Stepped { seconds, traced: report.traced, busy };
                 if let Some(frame) = report.frame {
                     let _ = answers.send(Reply::Frame(frame.bytes));
                 }

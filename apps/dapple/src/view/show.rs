@@ -147,6 +147,7 @@ impl Show {
         let elapsed_s = self.last_s.map_or(0.0, |last| now_s - last);
         self.last_s = Some(now_s);
         let mut changed = self.clock.advance(elapsed_s);
+        self.look();
         let frames = self.feed.poll(self.clock.time_s())?;
         if let Some((duration_s, loaded_s)) = self.feed.extent_s() {
             self.clock.set_extent(duration_s, loaded_s);
@@ -166,6 +167,12 @@ impl Show {
             }
         }
         Ok(changed)
+    }
+
+    /// Tells the server how the viewer looks.
+    pub(super) fn look(&mut self) {
+        let camera = self.steering.camera(&self.scene, self.clock.time_s());
+        self.feed.look(&camera);
     }
 
     /// Hands a frame to the viewer.

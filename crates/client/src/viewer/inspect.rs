@@ -34,6 +34,11 @@ impl Inspection {
         *self = Inspection::default();
     }
 
+    /// What lies on the card is no longer right: texels are others'.
+    pub(super) fn forget_shown(&mut self) {
+        self.shown = Shown::Nothing;
+    }
+
     /// Notes the texels of dirty bands that are changing.
     pub(super) fn note(&mut self, atlas: &VisibilityAtlas, bands: &[AtlasBand], now_s: f64) {
         if self.changed_s.is_empty() {

@@ -59,6 +59,14 @@ impl Light {
                     VisibilityAtlas::new(store.layout().clone(), &self.scene, cuts, AtlasParams::default())
                 });
             }
+            Applied::Sets { removed, changes, .. } => {
+                self.inspection.forget_shown();
+                if let (Some(atlas), Some(store)) = (&mut self.atlas, self.subscriber.store()) {
+                    let cuts = self.subscriber.cuts();
+                    atlas.change_sets(&self.scene, store.layout().clone(), cuts, removed);
+                }
+                self.apply(changes, now_s, fade_s);
+            }
             Applied::Changes(changes) => self.apply(changes, now_s, fade_s),
             Applied::Ignored(_) => {}
         }
@@ -126,6 +134,9 @@ impl Light {
             for instance in 0..self.scene.instances.len() as u32 {
                 gpu_scene.set_pages(gpu, instance, &[])?;
             }
+        }
+        for instance in atlas.take_gone() {
+            gpu_scene.set_pages(gpu, instance, &[])?;
         }
         for instance in atlas.take_ready() {
             let Some(charts) = atlas.charts(instance) else { continue };

@@ -100,7 +100,7 @@ impl Viewer {
         self.stats.changed = self.changed_by(&applied);
         match &applied {
             Applied::Changes(changes) => self.paper.apply(changes),
-            Applied::NewLayout => {
+            Applied::NewLayout | Applied::Sets { .. } => {
                 self.paper.forget();
                 self.points = None;
             }
@@ -109,11 +109,17 @@ impl Viewer {
         Ok(applied)
     }
 
-    /// How many points a frame has changed that was just taken, by what [`Viewer::receive`] gave: all for a new layout.
+    /// How many points a frame has changed that was just taken, by what [`Viewer::receive`] gave: all for a new layout, those that came for one
+    /// of which sets stay.
     pub fn changed_by(&self, applied: &Applied) -> u32 {
         match applied {
             Applied::NewLayout => self.stats.points,
             Applied::Changes(changes) => changes.len() as u32,
+            Applied::Sets { added, changes, .. } => {
+                let layout = self.store().map(|store| store.layout());
+                let sets = added.iter().filter_map(|instance| layout?.set_of_instance(*instance));
+                (changes.len() + sets.map(|set| set.len()).sum::<usize>()) as u32
+            }
             Applied::Ignored(_) => 0,
         }
     }

@@ -63,6 +63,21 @@ impl Cuts {
         Ok(Cuts { sets })
     }
 
+    /// These cuts without those of the instances `gone` (ascending), and with those of `added` in place of any that there are.
+    pub fn with_sets(&self, gone: &[u32], added: &Cuts) -> Cuts {
+        let has = |cuts: &Cuts, instance| cuts.sets.binary_search_by_key(&instance, |s| s.instance).is_ok();
+        let stays = |set: &&SetCuts| gone.binary_search(&set.instance).is_err() && !has(added, set.instance);
+        let mut sets: Vec<SetCuts> = self.sets.iter().filter(stays).chain(&added.sets).cloned().collect();
+        sets.sort_unstable_by_key(|set| set.instance);
+        Cuts { sets }
+    }
+
+    /// The cuts of some instances (ascending) alone.
+    pub fn only(&self, instances: &[u32]) -> Cuts {
+        let is_kept = |set: &&SetCuts| instances.binary_search(&set.instance).is_ok();
+        Cuts { sets: self.sets.iter().filter(is_kept).cloned().collect() }
+    }
+
     /// The sets, in order of instance.
     pub fn sets(&self) -> &[SetCuts] {
         &self.sets
@@ -128,6 +143,15 @@ mod tests {
         ] {
             assert_eq!(Cuts::new(bad).unwrap_err().reason, reason);
         }
+    }
+
+    #[test]
+    fn sets_come_and_go() {
+        let held = Cuts::new(vec![set(1, &[(3, 1)]), set(2, &[(3, 1)]), set(5, &[(3, 1)])]).unwrap();
+        let added = Cuts::new(vec![set(0, &[(4, 1)]), set(2, &[(9, 2)])]).unwrap();
+        let now = held.with_sets(&[5, 7], &added);
+        assert_eq!(now.sets(), [set(0, &[(4, 1)]), set(1, &[(3, 1)]), set(2, &[(9, 2)])]);
+        assert_eq!(now.only(&[0, 2, 3]), added);
     }
 
     #[test]

@@ -58,11 +58,20 @@ pub enum LayoutError {
         /// What is wrong.
         reason: &'static str,
     },
+    /// Sets that come are laid by other lengths.
+    #[error("layout: sets that come have another quantum or spacing; lay them with the same density")]
+    OtherLengths,
+    /// A set that is to go is not there.
+    #[error("layout: instance {0} has no set that could go")]
+    NoSuchSet(u32),
+    /// A set that comes is there already.
+    #[error("layout: instance {0} has a set already")]
+    SetExists(u32),
 }
 
 impl PointLayout {
     /// Checks and joins sets; fills in each set's `first`.
-    pub fn new(quantum_m: f32, spacing_m: f32, mut sets: Vec<PointSet>) -> Result<PointLayout, LayoutError> {
+    pub fn new(quantum_m: f32, spacing_m: f32, sets: Vec<PointSet>) -> Result<PointLayout, LayoutError> {
         for (name, value) in [("quantum_m", quantum_m), ("spacing_m", spacing_m)] {
             if !(value.is_finite() && value > 0.0) {
                 return Err(LayoutError::BadLength { name, value });
@@ -72,9 +81,8 @@ impl PointLayout {
         if total > u64::from(MAX_POINTS) {
             return Err(LayoutError::TooManyPoints(total));
         }
-        let mut first = 0u32;
         let mut last_instance = None;
-        for (index, set) in sets.iter_mut().enumerate() {
+        for (index, set) in sets.iter().enumerate() {
             let bad = |reason| LayoutError::BadSet { set: index, reason };
             if last_instance.is_some_and(|last| last >= set.instance) {
                 return Err(bad("instances must increase"));
@@ -93,10 +101,18 @@ impl PointLayout {
             if (1..set.positions.len()).any(|i| key(i - 1) > key(i)) {
                 return Err(bad("points are not in Morton order"));
             }
-            set.first = first;
-            first += set.positions.len() as u32;
         }
-        Ok(PointLayout { quantum_m, spacing_m, sets, len: first })
+        Ok(PointLayout::joined(quantum_m, spacing_m, sets))
+    }
+
+    /// Fills in each set's `first`; the rest has been checked.
+    pub(super) fn joined(quantum_m: f32, spacing_m: f32, mut sets: Vec<PointSet>) -> PointLayout {
+        let mut len = 0;
+        for set in &mut sets {
+            set.first = len;
+            len += set.positions.len() as u32;
+        }
+        PointLayout { quantum_m, spacing_m, sets, len }
     }
 
     /// Edge of one integer step in rest space, metres.

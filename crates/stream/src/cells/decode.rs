@@ -101,6 +101,9 @@ impl CellSubscriber {
     pub fn receive(&mut self, frame: &[u8]) -> Result<CellChanges, CellError> {
         let limits = Limits { max_frame_bytes: self.limits.max_frame_bytes, ..Limits::default() };
         let (header, payload) = open(frame, &limits)?;
+        if header.kind == FrameKind::Sets {
+            return Err(bad("cells have no such kind of frame").into());
+        }
         let mut reader = Reader::new(payload);
         if reader.array(PART)? != TAG {
             return Err(bad("these are not cells").into());
@@ -135,7 +138,7 @@ impl CellSubscriber {
                 self.state = Some(State { table, epoch, time_s });
                 Ok(changes)
             }
-            FrameKind::Delta => {
+            FrameKind::Delta | FrameKind::Sets => {
                 let Some(state) = self.state.as_mut() else {
                     return Err(CellError::Gap { found: epoch, held });
                 };
@@ -158,7 +161,9 @@ impl CellSubscriber {
                 let grids = self.limits.max_grids as usize * GRID_BYTES;
                 contents(self.limits.max_buckets) + grids + 32 + 8 + INDEX_BYTES
             }
-            FrameKind::Delta => contents(self.table().map_or(0, |table| table.layout().bucket_count())),
+            FrameKind::Delta | FrameKind::Sets => {
+                contents(self.table().map_or(0, |table| table.layout().bucket_count()))
+            }
         }
     }
 

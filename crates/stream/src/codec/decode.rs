@@ -20,7 +20,7 @@ pub(crate) struct SnapshotParts<'a> {
 /// The parts of a delta, its changes still encoded.
 pub(crate) struct DeltaParts<'a> {
     pub(crate) base_epoch: u64,
-    changes: Reader<'a>,
+    pub(super) changes: Reader<'a>,
 }
 
 /// What the layout part of a snapshot says.

@@ -95,12 +95,24 @@ pub(crate) fn delta_payload(
     epochs_back: u64,
     (layout, near): (&PointLayout, &mut Near),
     held: &[u8],
-    mut goal: Goal<'_>,
+    goal: Goal<'_>,
     fit: &mut Fit,
     scratch: &mut Scratch,
 ) -> (Vec<u8>, Vec<ValueChange>) {
     let mut out = Vec::new();
     write_varint(&mut out, epochs_back);
+    append_changes(out, (layout, near), held, goal, fit, scratch)
+}
+
+/// What a delta has after its base, appended to `out`.
+pub(crate) fn append_changes(
+    mut out: Vec<u8>,
+    (layout, near): (&PointLayout, &mut Near),
+    held: &[u8],
+    mut goal: Goal<'_>,
+    fit: &mut Fit,
+    scratch: &mut Scratch,
+) -> (Vec<u8>, Vec<ValueChange>) {
     let scale = goal.scale(fit);
     out.extend([scale.step, scale.follow]);
     let mut writer = Writer::new(out);
@@ -111,7 +123,7 @@ pub(crate) fn delta_payload(
 
 /// Bits of a coordinate within its cell, so that a cell is about as large as the points are apart: then most
 /// surface cells hold one point, which is where gaps and places together are shortest.
-fn local_bits(layout: &PointLayout) -> u32 {
+pub(crate) fn local_bits(layout: &PointLayout) -> u32 {
     let steps = (layout.spacing_m() / layout.quantum_m()) as u32; // saturates
     steps.max(1).ilog2().min(MAX_LOCAL_BITS)
 }

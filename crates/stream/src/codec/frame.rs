@@ -7,7 +7,7 @@ use super::{DecodeError, Limits};
 pub const MAGIC: [u8; 2] = [0x44, 0x50];
 
 /// Version of the format that this code writes, and the only one it reads.
-pub const VERSION: u8 = 3;
+pub const VERSION: u8 = 4;
 
 /// Bytes before the numbers of the header: magic, version, kind.
 const FIXED_BYTES: usize = 4;
@@ -22,6 +22,8 @@ pub enum FrameKind {
     Snapshot,
     /// What changed since an epoch that the receiver must hold.
     Delta,
+    /// Which instances have points, and what else changed since an epoch that the receiver must hold.
+    Sets,
 }
 
 impl FrameKind {
@@ -29,6 +31,7 @@ impl FrameKind {
         match self {
             FrameKind::Snapshot => 1,
             FrameKind::Delta => 2,
+            FrameKind::Sets => 3,
         }
     }
 }
@@ -100,7 +103,7 @@ pub(crate) fn open<'a>(bytes: &'a [u8], limits: &Limits) -> Result<(FrameHeader,
 }
 
 fn kind_of(byte: u8) -> Option<FrameKind> {
-    [FrameKind::Snapshot, FrameKind::Delta].into_iter().find(|k| k.byte() == byte)
+    [FrameKind::Snapshot, FrameKind::Delta, FrameKind::Sets].into_iter().find(|k| k.byte() == byte)
 }
 
 /// The kind as its byte, and the header with a kind still to be filled in.

@@ -29,7 +29,6 @@ impl<'a> Reader<'a> {
         self.rest.len()
     }
 
-    #[cfg(feature = "cells")]
     pub(crate) fn is_empty(&self) -> bool {
         self.rest.is_empty()
     }

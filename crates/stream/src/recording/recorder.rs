@@ -94,13 +94,13 @@ impl Recorder {
 pub(super) fn check_order(last: Option<&FrameHeader>, next: &FrameHeader) -> Result<(), &'static str> {
     match (last, next.kind) {
         (_, FrameKind::Snapshot) => Ok(()),
-        (None, FrameKind::Delta) => Err("is a delta before any snapshot"),
-        (Some(last), FrameKind::Delta) if last.group != next.group => {
+        (None, FrameKind::Delta | FrameKind::Sets) => Err("is a delta before any snapshot"),
+        (Some(last), FrameKind::Delta | FrameKind::Sets) if last.group != next.group => {
             Err("is a delta of another group than the frame before it")
         }
-        (Some(last), FrameKind::Delta) if last.epoch >= next.epoch => {
+        (Some(last), FrameKind::Delta | FrameKind::Sets) if last.epoch >= next.epoch => {
             Err("is a delta whose epoch is not above that of the frame before it")
         }
-        (Some(_), FrameKind::Delta) => Ok(()),
+        (Some(_), FrameKind::Delta | FrameKind::Sets) => Ok(()),
     }
 }

@@ -3,13 +3,14 @@
 use std::sync::{Arc, OnceLock};
 
 use dapple_store::charts::Cuts;
-use dapple_store::points::{Change, PointLayout, PointStore};
+use dapple_store::points::{Change, PointLayout, PointStore, SetsChange};
 
 use super::precision::Precision;
+use super::sets::difference;
 use super::within::{ENVELOPE_BYTES, Pressure, Search, Spending};
 use crate::codec::{
-    EncodedLayout, Fit, FrameKind, Goal, Near, Scratch, Tolerances, ValueChange, delta_payload,
-    encode_layout, seal, snapshot_payload,
+    EncodedLayout, Fit, FrameKind, Goal, Near, Scratch, Tolerances, ValueChange, append_changes,
+    delta_payload, encode_layout, local_bits, seal, sets_head, snapshot_payload,
 };
 
 /// How a [`Publisher`] numbers and cuts its groups, and how exact its deltas are.
@@ -30,7 +31,7 @@ pub struct PublisherConfig {
 /// One frame, ready for any transport.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
-    /// Snapshot or delta.
+    /// Snapshot, delta or change of sets.
     pub kind: FrameKind,
     /// Its group.
     pub group: u64,
@@ -60,7 +61,9 @@ pub struct Publisher {
 #[derive(Clone, Debug)]
 struct State {
     store: PointStore,
-    encoded: EncodedLayout,
+    cuts: Cuts,
+    /// Layout and cuts for snapshots, once someone needed one.
+    encoded: OnceLock<EncodedLayout>,
     near: Near,
     scratch: Scratch,
     fit: Fit,
@@ -85,21 +88,23 @@ impl Publisher {
     }
 
     /// Gives the cuts of a layout that is to be published next: they go out with its snapshots. Without them a layout
-    /// has none. A layout that has been published keeps what it has.
+    /// has none. A layout that has been published keeps what it has, and so do sets of the layout before that stay: only those that come
+    /// take theirs from here.
     pub fn set_cuts(&mut self, layout: Arc<PointLayout>, cuts: Cuts) {
         self.cuts = Some((layout, cuts));
     }
 
     /// How many bytes of each snapshot are cuts; 0 before the first [`Publisher::publish`].
     pub fn cut_bytes(&self) -> usize {
-        self.state.as_ref().map_or(0, |state| state.encoded.cut_bytes)
+        self.state.as_ref().map_or(0, |state| state.encoded().cut_bytes)
     }
 
     /// Publishes the state of the next epoch; epochs count the calls, from 0. Gives the frame for subscribers
     /// that are up to date, or `None` where what they hold is within the tolerance: a still scene sends nothing.
     ///
     /// What changed is found here, by comparison with what subscribers hold, which [`Publisher::store`] then is. The frame is a
-    /// delta, or a snapshot where a group starts: at first, with a new layout, and as [`PublisherConfig::deltas_per_group`] says.
+    /// delta, or a snapshot where a group starts: at first, with a new layout, and as [`PublisherConfig::deltas_per_group`] says. A layout
+    /// that shares sets with the one before is no new one: the frame says which sets go and come.
     pub fn publish(&mut self, store: &PointStore) -> Option<Frame> {
         self.publish_within(store, &Spending::default())
     }
@@ -130,15 +135,27 @@ impl Publisher {
                 }
             }
             old => {
-                let given = self.cuts.as_ref().filter(|(layout, _)| same_layout(layout, store.layout()));
-                let none = Cuts::default();
-                let encoded = encode_layout(store.layout(), given.map_or(&none, |(_, cuts)| cuts));
+                let given = self.cuts.take().filter(|(layout, _)| same_layout(layout, store.layout()));
+                let cuts = given.map_or(Cuts::default(), |(_, cuts)| cuts);
+                if let Some(state) = old
+                    && let Some(change) = state.difference(store)
+                {
+                    let full = self.config.deltas_per_group;
+                    let ends = full > 0 && state.deltas >= full;
+                    let precision = self.config.precision.in_range();
+                    let (frame, changed) = state.change_sets(epoch, (store, cuts), &change, precision);
+                    let frame = if ends { state.start_group(epoch, &self.scene_hash) } else { frame };
+                    (self.next_epoch, self.changed) = (epoch + 1, changed as u32);
+                    return Some(frame);
+                }
                 let group =
                     old.as_ref().map_or(self.config.first_group.min(u64::MAX >> 1), |state| state.group + 1);
+                let encoded = encode_layout(store.layout(), &cuts);
                 let state = State {
                     near: Near::new(store.layout(), encoded.local_bits),
                     store: store.clone(),
-                    encoded,
+                    cuts,
+                    encoded: OnceLock::from(encoded),
                     scratch: Scratch::default(),
                     fit: Fit::default(),
                     pressure: Pressure::default(),
@@ -149,7 +166,6 @@ impl Publisher {
                 };
                 let frame = state.snapshot(&self.scene_hash);
                 *old = Some(state);
-                self.cuts = None;
                 (Some(frame), store.visibility().len())
             }
         };
@@ -170,8 +186,10 @@ impl Publisher {
     /// Bytes held for what subscribers hold and for saying what changed, by capacity; the layout, which is shared, not counted.
     pub fn bytes(&self) -> usize {
         self.state.as_ref().map_or(0, |state| {
+            let cuts = state.cuts.sets().iter().map(|set| size_of_val(set) + size_of_val(&set.cuts[..]));
             state.store.visibility().len()
-                + state.encoded.bytes.capacity()
+                + cuts.sum::<usize>()
+                + state.encoded.get().map_or(0, |encoded| encoded.bytes.capacity())
                 + state.near.bytes()
                 + state.scratch.bytes()
                 + state.snapshot.get().map_or(0, |frame| frame.bytes.len())
@@ -208,10 +226,14 @@ impl State {
         self.snapshot.get_or_init(make).clone()
     }
 
+    fn encoded(&self) -> &EncodedLayout {
+        self.encoded.get_or_init(|| encode_layout(self.store.layout(), &self.cuts))
+    }
+
     fn payload(&self, scene_hash: &[u8; 32]) -> Vec<u8> {
         snapshot_payload(
             scene_hash,
-            &self.encoded,
+            self.encoded(),
             (self.store.layout(), &self.near),
             self.store.visibility(),
         )
@@ -296,6 +318,46 @@ impl State {
         self.deltas = self.deltas.saturating_add(1);
         self.snapshot = OnceLock::new();
         (Frame::new(FrameKind::Delta, self.group, epoch, &payload), changes.len())
+    }
+
+    /// Which sets lead to another layout, if it shares any with this one. What the frame would be is not weighed against a snapshot,
+    /// which would have to be made for that: it is shorter by about what stays.
+    fn difference(&self, store: &PointStore) -> Option<SetsChange> {
+        difference((&self.store, &self.cuts), (store, &self.cuts))
+    }
+
+    /// Goes on to another layout, and to values within the tolerance, in the same group; `cuts` are those of the sets that come. Also
+    /// says how many points have other values, those that come included.
+    fn change_sets(
+        &mut self,
+        epoch: u64,
+        (store, cuts): (&PointStore, Cuts),
+        change: &SetsChange,
+        precision: Precision,
+    ) -> (Frame, usize) {
+        let added = PointStore::default().carried(store.layout().only(&change.added).into(), store);
+        let cuts = cuts.only(&change.added);
+        let mut payload = sets_head(epoch - self.epoch, &change.removed, &added, &cuts);
+        let mut changed = added.visibility().len();
+        self.store = self.store.carried(store.layout().clone(), &added);
+        self.cuts = self.cuts.with_sets(&change.removed, &cuts);
+        self.near = Near::new(store.layout(), local_bits(store.layout()));
+        let held = self.store.visibility();
+        if let Some(goal) =
+            Goal::new(held, store.visibility(), Tolerances::Even(precision.tolerance), precision.step)
+        {
+            let near = (&**store.layout(), &mut self.near);
+            let (bytes, changes) =
+                append_changes(payload, near, held, goal, &mut self.fit, &mut self.scratch);
+            let news: Vec<Change> =
+                changes.iter().map(|c| Change { point: c.point, visibility: c.new }).collect();
+            self.store.apply(&news).expect("changes are of points of the store");
+            (payload, changed) = (bytes, changed + changes.len());
+        }
+        (self.encoded, self.snapshot) = (OnceLock::new(), OnceLock::new());
+        self.epoch = epoch;
+        self.deltas = self.deltas.saturating_add(1);
+        (Frame::new(FrameKind::Sets, self.group, epoch, &payload), changed)
     }
 }
 

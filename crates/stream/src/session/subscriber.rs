@@ -6,15 +6,26 @@ use dapple_store::charts::Cuts;
 use dapple_store::points::{Change, PointLayout, PointStore, StoreError};
 
 use crate::codec::{
-    DecodeError, DecodedLayout, FrameHeader, FrameKind, Limits, Near, Scratch, ValueChange, decode_changes,
-    decode_layout, decode_values, open, parse_delta, parse_snapshot,
+    DecodeError, DecodedLayout, DecodedSets, FrameHeader, FrameKind, Limits, Near, Scratch, ValueChange,
+    decode_changes, decode_layout, decode_sets_change, decode_values, open, parse_delta, parse_snapshot,
 };
+use crate::session::sets::{difference, value_changes};
 
 /// What a frame did to the store, so that the receiver redoes only that.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Applied {
     /// A snapshot brought a layout: everything derived from points must be made anew.
     NewLayout,
+    /// The points of whole instances went and came; what was derived from the others still holds, but their indices in the store
+    /// may be others. A set that goes and comes is another one.
+    Sets {
+        /// Instances whose points went, ascending.
+        removed: Vec<u32>,
+        /// Instances whose points came, with the values that the store now holds, ascending.
+        added: Vec<u32>,
+        /// New values of points that stayed, in order of index, which is that in the store as it is now.
+        changes: Vec<ValueChange>,
+    },
     /// The points are the same; these have new values, in order of index.
     Changes(Vec<ValueChange>),
     /// Nothing; the frame was not needed.
@@ -95,8 +106,10 @@ struct State {
     group: u64,
     epoch: u64,
     scene_hash: [u8; 32],
-    /// The layout as it came, to know it again in the next snapshot without decoding it.
+    /// The layout as it came, to know it again in the next snapshot without decoding it; empty once sets came or went.
     layout_bytes: Vec<u8>,
+    /// Bits of a coordinate within its cell.
+    local_bits: u32,
     cuts: Cuts,
     store: PointStore,
     near: Near,
@@ -119,6 +132,7 @@ impl Subscriber {
         match header.kind {
             FrameKind::Snapshot => self.receive_snapshot(&header, payload),
             FrameKind::Delta => self.receive_delta(&header, payload),
+            FrameKind::Sets => self.receive_sets(&header, payload),
         }
     }
 
@@ -192,18 +206,33 @@ impl Subscriber {
         let DecodedLayout { layout, cuts, local_bits } = decode_layout(parts.layout, &self.limits)?;
         let near = Near::new(&layout, local_bits);
         let values = decode_values(parts.values, &layout, &near)?;
-        let layout = Arc::new(layout);
+        let mut store = new_store(layout.into(), values)?;
+        let mut applied = Applied::NewLayout;
+        if let Some(state) = self.state.as_ref()
+            && state.scene_hash == parts.scene_hash
+            && let Some(change) = difference((&state.store, &state.cuts), (&store, &cuts))
+        {
+            let changes = value_changes(&state.store, &store, &change.added);
+            applied = if change.is_empty() {
+                // Known again by its points: what shares the layout goes on doing so.
+                store = new_store(state.store.layout().clone(), store.visibility().to_vec())?;
+                Applied::Changes(changes)
+            } else {
+                Applied::Sets { removed: change.removed, added: change.added, changes }
+            };
+        }
         self.state = Some(State {
             group: header.group,
             epoch: header.epoch,
             scene_hash: parts.scene_hash,
             layout_bytes: parts.layout.to_vec(),
+            local_bits,
             cuts,
-            store: new_store(layout, values)?,
+            store,
             near,
             scratch: Scratch::default(),
         });
-        Ok(Applied::NewLayout)
+        Ok(applied)
     }
 
     fn receive_delta(&mut self, header: &FrameHeader, payload: &[u8]) -> Result<Applied, ReceiveError> {
@@ -221,6 +250,33 @@ impl Subscriber {
         state.store.apply(&news).map_err(misfit)?;
         state.epoch = header.epoch;
         Ok(Applied::Changes(changes))
+    }
+
+    fn receive_sets(&mut self, header: &FrameHeader, payload: &[u8]) -> Result<Applied, ReceiveError> {
+        let parts = parse_delta(header.epoch, payload)?;
+        let need =
+            |held| ReceiveError::NeedSnapshot { group: header.group, base_epoch: parts.base_epoch, held };
+        let state = self.state.as_mut().ok_or(need(None))?;
+        if (state.group, state.epoch) != (header.group, parts.base_epoch) {
+            return Err(need(Some((state.group, state.epoch))));
+        }
+        let held = (&**state.store.layout(), &state.cuts, state.local_bits);
+        let DecodedSets { gone, added, cuts, changes } = decode_sets_change(&parts, held, &self.limits)?;
+        let mut store = state.store.with_sets(&gone, &added).map_err(DecodeError::from)?;
+        let mut near = Near::new(store.layout(), state.local_bits);
+        if let Some(parts) = &changes {
+            let scratch = &mut state.scratch;
+            let changes = decode_changes(parts, store.layout(), &mut near, store.visibility(), scratch)?;
+            let news: Vec<Change> =
+                changes.iter().map(|c| Change { point: c.point, visibility: c.new }).collect();
+            store.apply(&news).map_err(misfit)?;
+        }
+        let added: Vec<u32> = added.layout().sets().iter().map(|set| set.instance).collect();
+        let changes = value_changes(&state.store, &store, &added);
+        state.cuts = state.cuts.with_sets(&gone, &cuts);
+        state.layout_bytes = Vec::new();
+        (state.store, state.near, state.epoch) = (store, near, header.epoch);
+        Ok(Applied::Sets { removed: gone, added, changes })
     }
 }
 

@@ -65,6 +65,7 @@ impl Settings {
                 ray_budget: options.ray_budget,
                 rays_still: options.rays_still.unwrap_or(0),
                 budget: options.budget.or(preset.map(Preset::budget)),
+                max_points: options.max_points,
             },
             hdr_flip: options.hdr_flip.unwrap_or(false),
         };
@@ -121,6 +122,11 @@ impl Settings {
                 "{method} needs a video codec, which this program was built without: build it with `--features sas`, or leave \
                  {method} out of --methods"
             );
+        }
+        if let Some(method) = self.methods.iter().find(|m| m.is_paper())
+            && self.step.max_points.is_some()
+        {
+            bail!("--max-points: the points of {method} cannot come and go; leave one of the two out");
         }
         for (name, empty) in [
             ("--methods", self.methods.is_empty()),

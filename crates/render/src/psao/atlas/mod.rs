@@ -6,6 +6,7 @@
 mod job;
 mod pages;
 mod resolve;
+mod sets;
 #[cfg(test)]
 mod tests;
 mod twin;
@@ -89,6 +90,8 @@ pub struct VisibilityAtlas {
     pages: Pages,
     /// Instances that became ready since they were last asked for.
     ready: Vec<u32>,
+    /// Instances whose points went since they were last asked for.
+    gone: Vec<u32>,
     /// Sets whose texels fade in from open and are not listed among `fading`; the last ones are those of `ready`.
     fresh: Vec<usize>,
     /// All other texels whose two values may differ, each once.
@@ -146,29 +149,26 @@ impl VisibilityAtlas {
         cuts: Option<&Cuts>,
         params: AtlasParams,
     ) -> VisibilityAtlas {
-        let sets = layout.sets();
-        let mut queue: Vec<usize> = (0..sets.len())
-            .filter(|&i| !sets[i].is_empty() && scene.instances.get(sets[i].instance as usize).is_some())
-            .collect();
-        // The largest last, where it is taken from first.
-        queue.sort_by_key(|&i| (sets[i].len(), std::cmp::Reverse(i)));
         let pages = Pages::for_points(layout.len());
-        VisibilityAtlas {
+        let mut atlas = VisibilityAtlas {
             cuts: cuts.cloned(),
             params,
-            sets: sets.iter().map(|_| SetState::Open).collect(),
+            sets: layout.sets().iter().map(|_| SetState::Open).collect(),
             moves: scene.moving_instances(),
-            queue,
+            queue: Vec::new(),
             job: None,
             done: 0,
             texels: 0,
             pages,
             ready: Vec::new(),
+            gone: Vec::new(),
             fresh: Vec::new(),
             fading: Vec::new(),
             failed: Vec::new(),
             layout,
-        }
+        };
+        atlas.queue_open(scene);
+        atlas
     }
 
     /// Goes on making charts and weights, about `texels` texels of it, in parallel in the caller's rayon pool. Call it with

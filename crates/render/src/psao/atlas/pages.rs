@@ -112,6 +112,19 @@ impl Pages {
         }
     }
 
+    /// Gives back the places of pages, whose texels are open from now on. Lists of fading texels must be cleaned of those that are
+    /// no longer listed.
+    pub(super) fn free(&mut self, placements: &[Placement], sizes: &[PageSize]) {
+        for (place, size) in placements.iter().zip(sizes) {
+            self.fill(*place, *size, |_| OPEN);
+            for y in 0..u32::from(size.height) {
+                let start = self.address(u32::from(place.layer), u32::from(place.x), u32::from(place.y) + y);
+                (start..start + u32::from(size.width)).for_each(|address| self.set_listed(address, false));
+            }
+        }
+        self.places.remove(placements, sizes);
+    }
+
     /// Goes on with the fade of all texels of a page that no list has, as [`Pages::advance`] does; those that go on
     /// fading join `fading`.
     pub(super) fn advance_page(
@@ -164,7 +177,7 @@ impl Pages {
     }
 
     #[inline]
-    fn is_listed(&self, address: u32) -> bool {
+    pub(super) fn is_listed(&self, address: u32) -> bool {
         self.listed[address as usize / 64] >> (address % 64) & 1 != 0
     }
 

@@ -1,5 +1,7 @@
 //! Exactness and truth of the atlas.
 
+mod sets;
+
 use dapple_scene::{AlphaMode, Material};
 use dapple_store::charts::{Candidate, ChartParams, PointNeighbours, SetCuts, SiteCut, fingerprint};
 use dapple_store::points::{MAX_COORDINATE, PackedNormal, PointSet, morton_code};

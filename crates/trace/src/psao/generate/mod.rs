@@ -5,6 +5,7 @@
 
 mod anchor;
 mod eliminate;
+mod layer;
 #[cfg(test)]
 mod tests;
 
@@ -19,6 +20,7 @@ use rayon::prelude::*;
 pub use anchor::Anchor;
 pub(crate) use anchor::{PosedPoint, pose_anchor};
 use eliminate::{Candidate, eliminate, maximum_radius};
+pub use layer::PointLayer;
 
 use crate::inside::mostly_backs;
 use crate::rtao::Site;
@@ -117,23 +119,26 @@ pub enum GenerateError {
 /// # Errors
 /// The density is no number above 0, or would give too many points.
 pub fn check_density(scene: &Scene, params: &GenerateParams) -> Result<(), GenerateError> {
-    measure(scene, params).map(|_| ())
-}
-
-fn measure(scene: &Scene, params: &GenerateParams) -> Result<Vec<SurfaceArea>, GenerateError> {
     let density = params.points_per_m2;
-    if !(density.is_finite() && density > 0.0) {
-        return Err(GenerateError::BadDensity(density));
-    }
-    let areas: Vec<SurfaceArea> =
-        (0..scene.instances.len()).into_par_iter().map(|i| SurfaceArea::measure(scene, i)).collect();
-    let area_m2: f64 = areas.iter().map(|a| a.total).sum();
+    let area_m2: f64 = measure(scene, density)?.iter().map(|(area, _)| area).sum();
     let limit = params.max_points.min(MAX_POINTS);
     let points = (0.5 * area_m2 * f64::from(density)) as u64;
     if points > u64::from(limit) {
         return Err(GenerateError::TooManyPoints { points_per_m2: density, area_m2, points, limit });
     }
-    Ok(areas)
+    Ok(())
+}
+
+/// Surface of each instance, and how long it is.
+fn measure(scene: &Scene, density: f32) -> Result<Vec<(f64, f32)>, GenerateError> {
+    if !(density.is_finite() && density > 0.0) {
+        return Err(GenerateError::BadDensity(density));
+    }
+    let measure = |i| {
+        let area = SurfaceArea::measure(scene, i);
+        (area.total, area.extent_m())
+    };
+    Ok((0..scene.instances.len()).into_par_iter().map(measure).collect())
 }
 
 /// Lays points on all instances that receive visibility.
@@ -147,37 +152,18 @@ pub fn generate_points(
     params: &GenerateParams,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<GeneratedPoints, GenerateError> {
-    let areas = measure(scene, params)?;
-    let density = params.points_per_m2;
-    let r_max = maximum_radius(1.0, 0.5 * f64::from(density)) as f32;
-    let spacing_m = 2.0 * r_max;
-    let sides = Sides::new(scene);
+    check_density(scene, params)?;
+    let layer = PointLayer::new(scene, params)?;
     let done = std::sync::atomic::AtomicUsize::new(0);
-    let laid: Vec<LaidInstance> = areas
-        .par_iter()
-        .enumerate()
-        .map(|(instance, area)| {
-            let mut laid = lay_instance(scene, instance, area, density, r_max, params.seed);
-            laid.drop_inside(scene, pose, tracer, &sides, params);
+    let laid: Vec<LaidInstance> = (0..scene.instances.len())
+        .into_par_iter()
+        .map(|instance| {
+            let laid = layer.lay_one(scene, pose, tracer, instance);
             progress(1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed));
             laid
         })
         .collect();
-
-    // 32 steps a spacing keep the rounding (1 mm at N = 512) far below the kernels' width; coarser only for huge instances.
-    let extent = laid.iter().map(LaidInstance::extent).fold(0.0, f32::max);
-    let quantum_m = (spacing_m / 32.0).max(extent / (MAX_COORDINATE - 1) as f32);
-    let mut sets = Vec::new();
-    let mut anchors = Vec::new();
-    let mut dropped_inside = 0;
-    for (instance, laid) in laid.into_iter().enumerate() {
-        dropped_inside += laid.dropped;
-        if !laid.points.is_empty() {
-            sets.push(laid.into_set(instance as u32, quantum_m, &mut anchors));
-        }
-    }
-    let layout = Arc::new(PointLayout::new(quantum_m, spacing_m, sets)?);
-    Ok(GeneratedPoints { layout, anchors, dropped_inside })
+    layer.join(laid)
 }
 
 /// Rest-space area of an instance's triangles, as a running sum.
@@ -185,17 +171,25 @@ struct SurfaceArea {
     /// Sum up to and including each triangle; double-sided ones count twice.
     cumulative: Vec<f64>,
     total: f64,
+    /// Around the triangles that count.
+    min_rest: Vec3,
+    max_rest: Vec3,
 }
 
 impl SurfaceArea {
     fn measure(scene: &Scene, instance: usize) -> SurfaceArea {
         let placed = &scene.instances[instance];
+        let mut all = SurfaceArea {
+            cumulative: Vec::new(),
+            total: 0.0,
+            min_rest: Vec3::INFINITY,
+            max_rest: -Vec3::INFINITY,
+        };
         if !placed.receives {
-            return SurfaceArea { cumulative: Vec::new(), total: 0.0 };
+            return all;
         }
         let mesh = &scene.meshes[placed.mesh as usize];
-        let mut total = 0.0f64;
-        let mut cumulative = Vec::with_capacity(mesh.triangles.len());
+        all.cumulative.reserve_exact(mesh.triangles.len());
         for part in &mesh.parts {
             let sides = if scene.materials[part.material as usize].double_sided { 2.0 } else { 1.0 };
             let range = part.first_triangle as usize..(part.first_triangle + part.triangle_count) as usize;
@@ -204,16 +198,26 @@ impl SurfaceArea {
                 let area = 0.5 * f64::from((b - a).cross(c - a).length());
                 // A triangle too large for f32 has no usable place in rest space.
                 if area.is_finite() {
-                    total += sides * area;
+                    all.total += sides * area;
+                    if area > 0.0 {
+                        all.min_rest = all.min_rest.min(a).min(b).min(c);
+                        all.max_rest = all.max_rest.max(a).max(b).max(c);
+                    }
                 }
-                cumulative.push(total);
+                all.cumulative.push(all.total);
             }
         }
-        SurfaceArea { cumulative, total }
+        all
+    }
+
+    /// Longest edge of the box around it.
+    fn extent_m(&self) -> f32 {
+        if self.total > 0.0 { (self.max_rest - self.min_rest).max_element() } else { 0.0 }
     }
 }
 
 /// What the inside test knows of each instance.
+#[derive(Clone, Debug)]
 struct Sides {
     /// The animation moves or bends it.
     moving: Vec<bool>,
@@ -360,14 +364,6 @@ impl LaidInstance {
     fn bounds(&self) -> (Vec3, Vec3) {
         let positions = || self.points.iter().map(|p| p.position_rest);
         (positions().fold(Vec3::INFINITY, Vec3::min), positions().fold(Vec3::NEG_INFINITY, Vec3::max))
-    }
-
-    fn extent(&self) -> f32 {
-        if self.points.is_empty() {
-            return 0.0;
-        }
-        let (min, max) = self.bounds();
-        (max - min).max_element()
     }
 
     fn into_set(self, instance: u32, quantum_m: f32, anchors: &mut Vec<Anchor>) -> PointSet {

@@ -9,13 +9,14 @@ mod motion;
 mod patterns;
 mod report;
 mod select;
+mod spawn;
 mod trace;
 
 #[cfg(test)]
 mod tests;
 
-use dapple_scene::{Pose, Scene};
-use dapple_store::points::PointStore;
+use dapple_scene::{Aabb, Pose, Scene};
+use dapple_store::points::{PointLayout, PointStore};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -26,6 +27,7 @@ pub use interest::ConvexVolume;
 use motion::Motion;
 use patterns::Patterns;
 pub use report::{StepCounts, StepInput, UpdateReport};
+use spawn::Spawn;
 use trace::{Context, Scratch, Traced};
 
 /// Most rays of a point at rest.
@@ -87,6 +89,8 @@ pub struct Updater {
     store: PointStore,
     patterns: Patterns,
     clusters: Vec<Cluster>,
+    /// Points that have been laid and are not all traced yet; what was laid first comes first.
+    spawns: Vec<Spawn>,
     motion: Motion,
     /// Number of the last step; wraps.
     step: u32,
@@ -138,6 +142,7 @@ impl Updater {
             anchors,
             patterns: Patterns::new(params.rays),
             clusters,
+            spawns: Vec::new(),
             motion: Motion::new(scene, pose, params.radius_m),
             step: 0,
             restless: params.refines(),
@@ -159,6 +164,11 @@ impl Updater {
         &self.anchors
     }
 
+    /// The world boxes of all instances, as of the last step.
+    pub fn bounds_world(&self) -> &[Aabb] {
+        self.motion.bounds_world()
+    }
+
     /// Where every point is in the world at `pose` (`None` where its triangle has collapsed), in the order of the store.
     pub fn positions_world(&self, scene: &Scene, pose: &Pose) -> Vec<Option<Vec3>> {
         let sets = self.store.layout().sets().iter();
@@ -172,15 +182,7 @@ impl Updater {
     /// Bytes held now for each point, by capacity and with everything: layout, anchors, values, what is remembered of still
     /// instances, and the points' share of the tables that all of them use. It grows as movers come near more points.
     pub fn bytes_per_point(&self) -> f64 {
-        let sets = self.store.layout().sets();
-        let layout: usize = sets
-            .iter()
-            .map(|set| {
-                size_of_val(set)
-                    + set.positions.capacity() * size_of::<[u32; 3]>()
-                    + set.normals.capacity() * size_of::<[u8; 2]>()
-            })
-            .sum();
+        let layout = layout_bytes(self.store.layout());
         let bytes = size_of::<Updater>()
             + layout
             + self.store.visibility().len()
@@ -188,7 +190,8 @@ impl Updater {
             + self.clusters.iter().map(Cluster::bytes).sum::<usize>()
             + (self.clusters.capacity() - self.clusters.len()) * size_of::<Cluster>()
             + self.patterns.bytes()
-            + self.motion.bytes();
+            + self.motion.bytes()
+            + self.spawns.iter().map(Spawn::bytes).sum::<usize>();
         bytes as f64 / self.anchors.len().max(1) as f64
     }
 
@@ -232,6 +235,7 @@ impl Updater {
             report.changes.extend(traced.changes);
         }
         self.store.apply(&report.changes).expect("every traced point is a point of the store");
+        self.trace_spawned(scene, pose, tracer, &mut report.counts);
         report
     }
 
@@ -292,4 +296,14 @@ impl Updater {
             })
             .collect()
     }
+}
+
+/// Bytes of a layout's points, by capacity.
+fn layout_bytes(layout: &PointLayout) -> usize {
+    let of_set = |set: &dapple_store::points::PointSet| {
+        size_of_val(set)
+            + set.positions.capacity() * size_of::<[u32; 3]>()
+            + set.normals.capacity() * size_of::<[u8; 2]>()
+    };
+    layout.sets().iter().map(of_set).sum()
 }

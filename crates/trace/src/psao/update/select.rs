@@ -8,6 +8,7 @@ use super::interest::is_seen;
 use super::motion::{Near, Observed};
 use super::{StepCounts, StepInput, UpdateParams, Updater};
 use crate::Tracer;
+use crate::psao::generate::Anchor;
 
 /// Priorities are steps of waiting: whatever is seen comes before what has waited less than this longer out of sight.
 const SEEN_STEPS: u32 = 64;
@@ -15,6 +16,9 @@ const SEEN_STEPS: u32 = 64;
 const TOUCHED_STEPS: u32 = 8;
 /// For a change from open to blocked when last traced, less for lesser ones.
 const CHANGED_STEPS: u32 = 24;
+
+/// One part in so many of a budget is for points that have just been laid, while there are any.
+const KEPT_FOR_SPAWNS: u64 = 4;
 
 /// Longer than any priority lasts against waiting.
 #[cfg(test)]
@@ -33,17 +37,20 @@ impl Updater {
             return;
         }
         self.counts.selected = self.mark(scene, pose, &observed);
+        // What comes must not wait for ever for what moves, nor the other way round.
+        let kept = if self.spawns.is_empty() { 0 } else { input.ray_budget.unwrap_or(0) / KEPT_FOR_SPAWNS };
         let left = match input.ray_budget {
             None => {
                 self.clusters.par_iter_mut().for_each(|c| c.selected = c.dirty);
                 u64::MAX
             }
-            Some(budget) => self.spend(budget, input),
+            Some(budget) => self.spend(budget - kept, input) + kept,
         };
+        let left = self.choose_spawned(left, input.ray_budget != Some(0));
         let refinable = self.params.refines() && self.choose_refined(scene, pose, input, left);
         // What is traced now may be refined from the next step on.
         let traced = self.params.refines() && self.clusters.iter().any(|c| c.selected != 0);
-        self.restless = refinable || traced || self.counts.backlog > 0;
+        self.restless = refinable || traced || self.counts.backlog > 0 || !self.spawns.is_empty();
     }
 
     /// One step further in time.
@@ -55,27 +62,10 @@ impl Updater {
     /// Marks what motion may have changed. Returns the number of points.
     pub(super) fn mark(&mut self, scene: &Scene, pose: &Pose, observed: &Observed) -> u32 {
         let (anchors, step) = (&self.anchors, self.step);
-        let mark = |cluster: &mut Cluster| {
-            (cluster.selected, cluster.refining) = (0, 0);
-            let points = if observed.moved.get(cluster.instance as usize).is_some_and(|moved| *moved) {
-                cluster.set_off();
-                cluster.everything()
-            } else {
-                cluster.settle_down(scene, pose, anchors);
-                if cluster.memory().is_some_and(|memory| memory.valid != 0) {
-                    let switched = cluster.near(scene, pose, anchors, &observed.switched);
-                    cluster.forget(switched);
-                }
-                cluster.near(scene, pose, anchors, &observed.swept)
-            };
-            cluster.touched = points != 0;
-            cluster.mark(points, step);
-            if cluster.dirty != 0 && !cluster.moving {
-                cluster.remember(scene, pose, anchors);
-            }
-            points.count_ones()
-        };
-        self.clusters.par_iter_mut().map(mark).sum()
+        for spawn in &mut self.spawns {
+            spawn.follow(scene, pose, observed, step);
+        }
+        self.clusters.par_iter_mut().map(|cluster| cluster.follow(scene, pose, anchors, observed, step)).sum()
     }
 
     /// Selects by priority until the budget is spent. Returns what is left of it.
@@ -170,6 +160,35 @@ impl Updater {
 }
 
 impl Cluster {
+    /// Marks the points that motion may have changed. Returns their number.
+    pub(super) fn follow(
+        &mut self,
+        scene: &Scene,
+        pose: &Pose,
+        anchors: &[Anchor],
+        observed: &Observed,
+        step: u32,
+    ) -> u32 {
+        (self.selected, self.refining) = (0, 0);
+        let points = if observed.moved.get(self.instance as usize).is_some_and(|moved| *moved) {
+            self.set_off();
+            self.everything()
+        } else {
+            self.settle_down(scene, pose, anchors);
+            if self.memory().is_some_and(|memory| memory.valid != 0) {
+                let switched = self.near(scene, pose, anchors, &observed.switched);
+                self.forget(switched);
+            }
+            self.near(scene, pose, anchors, &observed.swept)
+        };
+        self.touched = points != 0;
+        self.mark(points, step);
+        if self.dirty != 0 && !self.moving {
+            self.remember(scene, pose, anchors);
+        }
+        points.count_ones()
+    }
+
     /// Where it is: its instance's box where its own is not kept up to date.
     pub(super) fn bounds_now<'a>(&'a self, instances: &'a [Aabb]) -> &'a Aabb {
         if self.moving { &instances[self.instance as usize] } else { self.bounds_world() }

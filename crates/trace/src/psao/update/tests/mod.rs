@@ -4,6 +4,7 @@ mod budget;
 mod exact;
 mod memory;
 mod refine;
+mod spawn;
 mod timing;
 
 use dapple_scene::glam::{Affine3A, Quat, Vec3};
