@@ -431,7 +431,10 @@ fn a_page_is_made_again_from_its_results() {
         std::fs::write(&file, text).unwrap();
         format!("{:#}", rebuild(&file, None).unwrap_err())
     };
-    assert!(refusal("{\"schema\": 1}").contains("has schema 1, this program reads 3: evaluate again"));
+    assert!(
+        refusal("{\"schema\": 1}")
+            .contains(&format!("has schema 1, this program reads {SCHEMA}: evaluate again"))
+    );
     assert!(refusal("{\"schema\": 3}").contains("is damaged"));
     assert!(refusal("# notes").contains("is not the results.json of an evaluation"));
     assert!(format!("{:#}", rebuild(&folder.path().join("none"), None).unwrap_err()).contains("cannot read"));
