@@ -33,7 +33,7 @@ pub struct ServerConfig {
     /// How changes are grouped, and how exactly they are sent. Its default here lets values be off by 4 of 255.
     pub publish: PublisherConfig,
     /// Most bits that deltas take in any second; `None` (default): as many as they need. Under it what matters least to viewers waits, or is
-    /// less exact: what is out of view, far away, or nearly right. Snapshots are not counted.
+    /// less exact: what is out of view, far away, or nearly right. Snapshots, and points that come under a cap, are not counted.
     pub bits_per_s: Option<u64>,
     /// Whether rays find out which points must not count at which texels of a client's atlas, because something solid stands
     /// between them. Costs some seconds at the start and some bytes of each snapshot; light leaks less. Default true.
@@ -252,7 +252,7 @@ impl Server {
                 let most_bytes = Some(budget.allowance(sent_s));
                 let spending = Spending { most_bytes, coarseness: &coarseness };
                 let frame = self.publisher.publish_within(self.updater.store(), &spending);
-                let sent = frame.as_ref().filter(|frame| frame.kind != FrameKind::Snapshot);
+                let sent = frame.as_ref().filter(|frame| frame.kind == FrameKind::Delta);
                 budget.spend(sent.map_or(0, |frame| frame.bytes.len()));
                 frame
             }
@@ -272,7 +272,10 @@ impl Server {
 
     /// From now on deltas take at most so many bits in any second; `None`: as many as they need.
     pub fn set_bits_per_s(&mut self, bits_per_s: Option<u64>) {
-        self.budget = bits_per_s.map(Budget::new);
+        self.budget = bits_per_s.map(|bits| match self.budget.take() {
+            Some(budget) => budget.with_bits_per_s(bits),
+            None => Budget::new(bits),
+        });
     }
 
     /// Points that a budget of bits did not reach.

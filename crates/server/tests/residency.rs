@@ -42,15 +42,17 @@ fn look(x: f32) -> [ConvexVolume; 1] {
 fn who_listens_follows_what_comes_and_goes() {
     let scene = scene();
     const CAP: u32 = 260;
-    let run = |budget: Option<u64>| {
+    let run = |budget: Option<u64>, bits_per_s: Option<u64>| {
         let first = look(5.0);
         let input = StepInput { interest: &first, ray_budget: budget, ..StepInput::default() };
-        let mut server = Server::watched(scene.clone(), &config(Some(CAP)), &input, &|_| ()).unwrap();
+        let config = ServerConfig { bits_per_s, ..config(Some(CAP)) };
+        let mut server = Server::watched(scene.clone(), &config, &input, &|_| ()).unwrap();
         assert!(server.too_large().contains(&0), "the floor has some 800 points");
         let mut live = Subscriber::new(Some(scene.hash().0), Limits::default());
         let mut frames = vec![server.join().unwrap().unwrap().bytes];
         live.receive(&frames[0]).unwrap();
         let (mut spawned, mut evicted, mut sets, mut most) = (0, 0, 0, 0);
+        let mut delta_bytes = Vec::new();
         for tick in 1..=900u32 {
             // There and back.
             let x = 5.0 + 18.0 * (1.0 - (f64::from(tick) / 450.0 - 1.0).abs()) as f32;
@@ -62,6 +64,8 @@ fn who_listens_follows_what_comes_and_goes() {
             most = most.max(report.points);
             spawned += report.spawned;
             evicted += report.evicted;
+            let delta = report.frame.as_ref().filter(|frame| frame.kind == FrameKind::Delta);
+            delta_bytes.push(delta.map_or(0, |frame| frame.bytes.len() as u64));
             if let Some(frame) = report.frame {
                 let applied = live.receive(&frame.bytes).unwrap();
                 assert_eq!(matches!(applied, Applied::Sets { .. }), frame.kind == FrameKind::Sets);
@@ -82,12 +86,16 @@ fn who_listens_follows_what_comes_and_goes() {
         }
         assert!(spawned > 8 && evicted > 8 && sets >= 8 && most > 200, "{spawned} {evicted} {sets} {most}");
         assert!(evicted < 40, "{evicted}: nothing takes turns");
+        if let Some(bits) = bits_per_s {
+            let most = delta_bytes.windows(30).map(|second| 8 * second.iter().sum::<u64>()).max();
+            assert!(most.is_some_and(|most| most <= bits && most > 0), "{most:?}");
+        }
         frames
     };
-    for budget in [None, Some(900)] {
-        let frames = run(budget);
+    for (rays, bits) in [(None, None), (Some(900), None), (None, Some(2000))] {
+        let frames = run(rays, bits);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
-        assert!(frames == pool.install(|| run(budget)), "the same on any number of threads");
+        assert!(frames == pool.install(|| run(rays, bits)), "the same on any number of threads");
     }
 }
 

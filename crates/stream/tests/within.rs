@@ -94,6 +94,25 @@ fn without_want_a_limit_changes_nothing() {
 }
 
 #[test]
+fn a_limit_that_is_missed_by_little_costs_little() {
+    for share in [0.5, 0.8, 0.9, 0.97] {
+        for coarseness in [1.0, 0.02, f32::INFINITY] {
+            let (mut free, mut limited) = (Ends::new(20_000, 0), Ends::new(20_000, 0));
+            let stretches = free.start.visibility().len().div_ceil(Spending::STRETCH);
+            // One stretch matters as much or little as it likes.
+            let mut scales = vec![1.0; stretches];
+            scales[0] = coarseness;
+            let store = cloud::moved(&free.start, 3, 0.1);
+            let bytes = free.publish(&store, &Spending::default());
+            let most = (f64::from(bytes as u32) * share) as usize;
+            let spending = Spending { most_bytes: Some(most), coarseness: &scales };
+            let sent = limited.publish(&store, &spending);
+            assert!(sent <= most && 2 * sent > most, "{sent} of {most}, {bytes} wanted, {coarseness}");
+        }
+    }
+}
+
+#[test]
 fn a_limit_is_used_and_spent_where_it_matters() {
     let mut ends = Ends::new(20_000, 0);
     let points = ends.start.visibility().len();

@@ -161,14 +161,16 @@ impl Options {
     /// These, and where they say nothing, what `other` says.
     pub(crate) fn or(self, other: &Options) -> Options {
         let other = other.clone();
+        // A preset that is given here comes before what is said there.
+        let preset = self.preset;
         Options {
             detail: self.detail.or(other.detail),
             animation: self.animation.or(other.animation),
             methods: self.methods.or(other.methods),
             frames: self.frames.or(other.frames),
             size: self.size.or(other.size),
-            points: self.points.or(other.points),
-            hz: self.hz.or(other.hz),
+            points: self.points.or(preset.map(|p| vec![p.points_per_m2()])).or(other.points),
+            hz: self.hz.or(preset.map(|p| vec![p.hz()])).or(other.hz),
             path: self.path.or(other.path),
             seconds: self.seconds.or(other.seconds),
             reference_rays: self.reference_rays.or(other.reference_rays),
@@ -179,7 +181,7 @@ impl Options {
             seed: self.seed.or(other.seed),
             ray_budget: self.ray_budget.or(other.ray_budget),
             rays_still: self.rays_still.or(other.rays_still),
-            budget: self.budget.or(other.budget),
+            budget: self.budget.or(preset.map(Preset::budget)).or(other.budget),
             preset: self.preset.or(other.preset),
             max_points: self.max_points.or(other.max_points),
             hdr_flip: self.hdr_flip.or(other.hdr_flip),

@@ -32,8 +32,8 @@ pub(super) fn of(case: &Case) -> Vec<String> {
         .collect();
     if !unfinished.is_empty() {
         advice.push(format!(
-            "points still waited for rays when watching after the move ended, so there is no time until the light settles: \
-             {}; raise --ray-budget",
+            "points still waited for rays or bits when watching after the move ended, so there is no time until the light settles: \
+             {}; raise --ray-budget or --budget",
             unfinished.join(", ")
         ));
     }

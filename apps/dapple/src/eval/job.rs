@@ -293,8 +293,7 @@ impl Line {
         let visibility = self.look(stage, pair, &frame.drawn, frame.time_s)?;
         self.rays += self.rays_of_look;
         let shown = Shown::new(&frame.drawn, visibility.as_deref())?;
-        // Everything else is within reach of something that moves.
-        let touched = |pixel: usize| frame.still[pixel][0].is_nan();
+        let touched = |pixel: usize| frame.still.touched[pixel];
         let compared = Compared::new(&frame.truth, &shown, desk.judge, stage.settings.hdr_flip, touched)?;
         let stem = format!("{}/{number:03}-{}", desk.folder, self.method);
         let files = shown.write(desk.out, &stem)?;
@@ -336,7 +335,7 @@ impl Line {
             None => before.clone(),
         };
         let (width, height) = (drawn.gbuffer.width, drawn.gbuffer.height);
-        self.flicker.add(width, height, &before, &now, &frame.still)?;
+        self.flicker.add(width, height, &before, &now, &frame.still.places)?;
         self.visibility = now;
         if let Some(last) = self.frames.last_mut() {
             last.flicker = self.flicker.rms().map(|rms| 255.0 * rms);

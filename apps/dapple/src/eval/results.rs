@@ -167,7 +167,7 @@ pub(crate) struct Settling {
     pub(crate) visibility_psnr_db: Vec<Option<f64>>,
     /// Root mean square difference of visibility to what is shown in the end, 0 … 1.
     pub(crate) behind_rms: Vec<f64>,
-    /// Whether points still waited for rays when watching ended, so that what is shown there is not the end.
+    /// Whether points still waited for rays or bits when watching ended, so that what is shown there is not the end.
     pub(crate) unfinished: bool,
     /// Seconds until no more than a twentieth of the squared difference is left; absent where nothing changed in view, or unfinished.
     pub(crate) settled_s: Option<f64>,
@@ -237,6 +237,7 @@ pub(crate) struct Params {
     pub(crate) rays_still: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) budget_kbit_per_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) max_points: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) rays_per_pixel: Option<u32>,

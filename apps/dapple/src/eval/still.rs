@@ -6,9 +6,14 @@ use dapple_client::Drawn;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Aabb, Scene};
 
-/// For each pixel its own centre, in pixels from the top left corner, or NaN where it shows nothing, something that moves, or a
-/// place within reach of something that moves.
-pub(super) type StillMap = Vec<[f32; 2]>;
+/// What of a picture stands still, and what does not.
+pub(super) struct StillMap {
+    /// For each pixel its own centre, in pixels from the top left corner, or NaN where it shows, in part at least, nothing, something
+    /// that moves, or a place within reach of something that moves.
+    pub(super) places: Vec<[f32; 2]>,
+    /// Whether a pixel shows, in part at least, something that moves or a place within reach of it.
+    pub(super) touched: Vec<bool>,
+}
 
 /// Still at the picture's time and at all of `times_s`.
 pub(super) fn still_map(
@@ -20,19 +25,24 @@ pub(super) fn still_map(
 ) -> StillMap {
     let reach = reach(scene, drawn, times_s, moving, radius_m);
     let gbuffer = &drawn.gbuffer;
-    let still = gbuffer.map_surfaces(scene, &drawn.pose, |index, surface| {
-        let place: Option<Vec3> = surface.map(|s| s.position_world);
-        let untouched = |place: Vec3| reach.iter().all(|bounds| bounds.distance_squared(place) > 0.0);
-        place.is_some_and(|p| !moving[gbuffer.samples()[index].instance as usize] && untouched(p))
+    // Of each sample, where it shows something: whether that stands still.
+    let still: Vec<Option<bool>> = gbuffer.map_surfaces(scene, &drawn.pose, |index, surface| {
+        let place: Vec3 = surface?.position_world;
+        let untouched = reach.iter().all(|bounds| bounds.distance_squared(place) > 0.0);
+        Some(untouched && !moving[gbuffer.samples()[index].instance as usize])
     });
     let width = gbuffer.width as usize;
-    let pixels = gbuffer.map_pixels(|mut samples| Iterator::all(&mut samples, |index| still[index]));
+    let pixels =
+        gbuffer.map_pixels(|mut samples| Iterator::all(&mut samples, |index| still[index] == Some(true)));
+    let touched =
+        gbuffer.map_pixels(|mut samples| Iterator::any(&mut samples, |index| still[index] == Some(false)));
     let centre = |pixel: usize| [(pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5];
-    pixels
+    let places = pixels
         .into_iter()
         .enumerate()
         .map(|(pixel, still)| if still { centre(pixel) } else { [f32::NAN; 2] })
-        .collect()
+        .collect();
+    StillMap { places, touched: touched.into_iter().collect() }
 }
 
 /// Boxes around what moves, at all times together, as wide as rays reach.

@@ -47,8 +47,8 @@ pub(super) struct Live {
     tick: Option<i64>,
     /// Ticks that it was asked for and has not answered.
     in_flight: u32,
-    /// Points come and go with what is looked at.
-    is_capped: bool,
+    /// The server spends, or keeps points, by what is looked at.
+    is_steered: bool,
     /// The last step did something, so the next one may as well, although nothing moves.
     is_busy: bool,
     /// As the viewer looks, and as it looked when the server was last asked.
@@ -67,7 +67,8 @@ impl Live {
         hz: f64,
         ray_budget: Option<u64>,
     ) -> Result<Live> {
-        let is_capped = config.max_resident_points.is_some();
+        let is_steered =
+            config.max_resident_points.is_some() || config.bits_per_s.is_some() || ray_budget.is_some();
         let (requests, asked) = channel();
         let (answers, replies) = channel();
         // One core is left to the picture.
@@ -87,7 +88,7 @@ impl Live {
             start: Start::Doing("laying points", 0.0),
             tick: None,
             in_flight: 0,
-            is_capped,
+            is_steered,
             is_busy: false,
             look: None,
             asked_look: None,
@@ -102,7 +103,7 @@ impl Live {
 
     /// Says how the viewer looks from now on.
     pub(super) fn look(&mut self, camera: &PosedCamera) {
-        if self.is_capped {
+        if self.is_steered {
             self.look = Some(ConvexVolume::frustum(camera, ASPECT, f32::INFINITY, 0.0));
         }
     }
@@ -130,7 +131,7 @@ impl Live {
         }
         let tick = self.tick_at(time_s);
         let differs =
-            self.tick != Some(tick) || self.look != self.asked_look || self.is_capped && self.is_busy;
+            self.tick != Some(tick) || self.look != self.asked_look || self.is_steered && self.is_busy;
         if self.start == Start::Done && self.in_flight == 0 && differs {
             self.ask(tick);
         }
@@ -225,6 +226,7 @@ fn run(
     answers: &Sender<Reply>,
 ) -> Result<()> {
     let mut server = server?;
+    let began = Instant::now();
     if let Some(frame) = server.join()? {
         let _ = answers.send(Reply::Frame(frame.bytes));
     }
@@ -234,9 +236,12 @@ fn run(
             Request::Time(time_s, look) => {
                 let start = Instant::now();
                 let input = StepInput { interest: look.as_slice(), ..*input };
-                let report = server.step_with(time_s, &input)?;
-                let (seconds, busy) =
-                    (start.elapsed().as_secs_f64(), report.frame.is_some() || report.rays > 0);
+                // A budget of bits goes by the clock: the scene's time may stand still or go back.
+                let report = server.step_at(time_s, began.elapsed().as_secs_f64(), &input)?;
+                let (seconds, busy) = (
+                    start.elapsed().as_secs_f64(),
+                    report.frame.is_some() || report.rays > 0 || report.held_back > 0,
+                );
                 let stepped = Reply::Stepped { seconds, traced: report.traced, busy };
                 if let Some(frame) = report.frame {
                     let _ = answers.send(Reply::Frame(frame.bytes));

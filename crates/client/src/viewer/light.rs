@@ -61,6 +61,8 @@ impl Light {
             }
             Applied::Sets { removed, changes, .. } => {
                 self.inspection.forget_shown();
+                // There may be room now.
+                self.problem = None;
                 if let (Some(atlas), Some(store)) = (&mut self.atlas, self.subscriber.store()) {
                     let cuts = self.subscriber.cuts();
                     atlas.change_sets(&self.scene, store.layout().clone(), cuts, removed);

@@ -14,6 +14,8 @@ pub struct Budget {
     sent: VecDeque<(f64, u64)>,
     sent_bytes: u64,
     now_s: f64,
+    /// What is added to the caller's clock.
+    offset_s: f64,
     /// Seconds between the last two frames; 0 before.
     step_s: f64,
 }
@@ -30,7 +32,19 @@ const SAME_S: f64 = 1e-6;
 impl Budget {
     /// Nothing is sent yet.
     pub fn new(bits_per_s: u64) -> Budget {
-        Budget { bits_per_s, sent: VecDeque::new(), sent_bytes: 0, now_s: f64::NEG_INFINITY, step_s: 0.0 }
+        Budget {
+            bits_per_s,
+            sent: VecDeque::new(),
+            sent_bytes: 0,
+            now_s: f64::NEG_INFINITY,
+            offset_s: 0.0,
+            step_s: 0.0,
+        }
+    }
+
+    /// Another budget for the same stream: what was sent still counts.
+    pub fn with_bits_per_s(self, bits_per_s: u64) -> Budget {
+        Budget { bits_per_s, ..self }
     }
 
     /// Bits a second.
@@ -38,9 +52,14 @@ impl Budget {
         self.bits_per_s
     }
 
-    /// Most bytes that a frame may take that is sent at `now_s` (seconds, of any clock; one that goes back stands still).
+    /// Most bytes that a frame may take that is sent at `now_s` (seconds, of any clock). A clock that goes back, as the time of a scene does
+    /// when it starts anew, is taken to have gone on by as much as between the frames before.
     pub fn allowance(&mut self, now_s: f64) -> usize {
-        // Also what is no number.
+        if now_s + self.offset_s < self.now_s {
+            self.offset_s = self.now_s + self.step_s - now_s;
+        }
+        let now_s = now_s + self.offset_s;
+        // Neither the same time nor what is no number.
         if now_s > self.now_s {
             self.step_s = if self.now_s.is_finite() { now_s - self.now_s } else { 0.0 };
             self.now_s = now_s;
@@ -114,12 +133,18 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_goes_back_gives_nothing_back() {
+    fn a_clock_that_goes_back_neither_gives_nor_takes() {
         let mut budget = Budget::new(8000);
         let first = budget.allowance(5.0);
         budget.spend(first);
-        assert_eq!(budget.allowance(4.0), (1000 - first) / 4);
+        assert_eq!(budget.allowance(5.0), (1000 - first) / 4, "the same time");
         assert_eq!(budget.allowance(f64::NAN), (1000 - first) / 4);
         assert_eq!(budget.allowance(6.0), 400, "a second later all is there again");
+        budget.spend(400);
+        assert_eq!(budget.allowance(0.5), 400, "as long after it as the one before");
+        budget.spend(400);
+        assert_eq!(budget.allowance(0.6), 300, "and the clock goes on from there");
+        let less = budget.with_bits_per_s(4000).allowance(0.6);
+        assert_eq!(less, 50, "what was sent counts");
     }
 }

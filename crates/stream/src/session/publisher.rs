@@ -113,7 +113,7 @@ impl Publisher {
     /// exact, until a later call has room for it. Then what subscribers hold can be farther off than the tolerance. Where nothing worth
     /// saying fits, nothing is sent.
     ///
-    /// Snapshots are as long as they are; and where a group starts, subscribers get to the values that a delta within
+    /// Snapshots are as long as they are, and so is what brings sets, without news of those that stay; and where a group starts, subscribers get to the values that a delta within
     /// the limit would have brought.
     pub fn publish_within(&mut self, store: &PointStore, spending: &Spending<'_>) -> Option<Frame> {
         let epoch = self.next_epoch;
@@ -143,6 +143,8 @@ impl Publisher {
                     let full = self.config.deltas_per_group;
                     let ends = full > 0 && state.deltas >= full;
                     let precision = self.config.precision.in_range();
+                    // Within a limit, what stays waits for the next frame.
+                    let precision = spending.most_bytes.is_none().then_some(precision);
                     let (frame, changed) = state.change_sets(epoch, (store, cuts), &change, precision);
                     let frame = if ends { state.start_group(epoch, &self.scene_hash) } else { frame };
                     (self.next_epoch, self.changed) = (epoch + 1, changed as u32);
@@ -326,14 +328,14 @@ impl State {
         difference((&self.store, &self.cuts), (store, &self.cuts))
     }
 
-    /// Goes on to another layout, and to values within the tolerance, in the same group; `cuts` are those of the sets that come. Also
-    /// says how many points have other values, those that come included.
+    /// Goes on to another layout in the same group, and to values within the tolerance if there is one for what stays; `cuts` are those
+    /// of the sets that come. Also says how many points have other values, those that come included.
     fn change_sets(
         &mut self,
         epoch: u64,
         (store, cuts): (&PointStore, Cuts),
         change: &SetsChange,
-        precision: Precision,
+        precision: Option<Precision>,
     ) -> (Frame, usize) {
         let added = PointStore::default().carried(store.layout().only(&change.added).into(), store);
         let cuts = cuts.only(&change.added);
@@ -343,9 +345,10 @@ impl State {
         self.cuts = self.cuts.with_sets(&change.removed, &cuts);
         self.near = Near::new(store.layout(), local_bits(store.layout()));
         let held = self.store.visibility();
-        if let Some(goal) =
-            Goal::new(held, store.visibility(), Tolerances::Even(precision.tolerance), precision.step)
-        {
+        let goal = precision.and_then(|Precision { tolerance, step }| {
+            Goal::new(held, store.visibility(), Tolerances::Even(tolerance), step)
+        });
+        if let Some(goal) = goal {
             let near = (&**store.layout(), &mut self.near);
             let (bytes, changes) =
                 append_changes(payload, near, held, goal, &mut self.fit, &mut self.scratch);

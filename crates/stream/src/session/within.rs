@@ -47,7 +47,8 @@ pub(super) struct Search {
 impl Search {
     /// `last` is what the delta before took.
     pub(super) fn new(last: Pressure, precision: Precision, coarseness: &[f32]) -> Search {
-        let coarsest = coarseness.iter().copied().fold(0.0, f32::max);
+        // What does not matter at all is infinite.
+        let coarsest = coarseness.iter().copied().filter(|c| c.is_finite()).fold(0.0, f32::max);
         let coarsest = if coarsest > 0.0 { coarsest } else { 1.0 };
         let least = (f32::from(precision.tolerance) + 1.0) / coarsest;
         let at = if last.0 < least { 0.0 } else { last.0 };
@@ -83,13 +84,14 @@ impl Search {
                 }
                 (low * high).sqrt()
             }
-            (Some(low), None) => guess.max(1.3 * low),
-            (None, Some(high)) => guess.min(high / 1.3),
+            // Further each time, so that something is enough in the end.
+            (Some(low), None) => guess.max(1.3 * low).max(self.least) * (1 << (self.tries - 1)) as f32,
+            (None, Some(high)) => {
+                let lower = guess.min(high / 1.3);
+                if lower < self.least { 0.0 } else { lower }
+            }
             (None, None) => return None,
         };
-        if self.at < self.least {
-            self.at = 0.0;
-        }
         Some(self)
     }
 }

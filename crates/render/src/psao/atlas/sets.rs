@@ -60,9 +60,10 @@ impl VisibilityAtlas {
                 None => self.job = None,
             }
         }
-        // What found no room may find it now.
+        // What found no room may find it now, if some went.
         self.failed.retain(|(instance, error)| {
-            removed.binary_search(instance).is_err() && matches!(error, BuildError::Charts(_))
+            let finds_none = removed.is_empty() || matches!(error, BuildError::Charts(_));
+            removed.binary_search(instance).is_err() && finds_none
         });
         self.cuts = cuts.cloned();
         self.queue_open(scene);

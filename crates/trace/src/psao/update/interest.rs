@@ -71,8 +71,8 @@ pub(super) fn is_seen(interest: &[ConvexVolume], bounds_world: &Aabb) -> bool {
 const UNSEEN: f32 = 8.0;
 
 impl Updater {
-    /// How much an error may be, for each `stretch` of points of the store, in proportion: the distance from the nearest eye that
-    /// sees them, metres, and 8 times that from the nearest eye if none does. An error of a point shows on pixels in proportion to one over
+    /// How much an error may be, for each `stretch` of points of the store, in proportion: the distance from the nearest eye, metres, where
+    /// one that does not see them counts as 8 times as far. Infinite where points are nowhere: their triangles have no area. An error of a point shows on pixels in proportion to one over
     /// the squared distance, so that errors in proportion to the distance cost every pixel alike. Empty without interest.
     pub fn coarseness(&self, interest: &[ConvexVolume], stretch: usize) -> Vec<f32> {
         if interest.is_empty() {
