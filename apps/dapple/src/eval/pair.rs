@@ -28,6 +28,8 @@ pub(super) struct Start {
     /// What values may be off, 255ths.
     pub(super) tolerance: u8,
     pub(super) seed: u32,
+    /// How far density follows the gradient of visibility.
+    pub(super) adaptive: f32,
 }
 
 impl Start {
@@ -42,6 +44,7 @@ impl Start {
             },
             tolerance: settings.threshold,
             seed: settings.seed,
+            adaptive: settings.adaptive,
         }
     }
 
@@ -49,6 +52,8 @@ impl Start {
         let generate = GenerateParams {
             points_per_m2: self.points_per_m2,
             seed: self.seed,
+            adaptive: self.adaptive,
+            radius_m: self.update.radius_m,
             ..GenerateParams::default()
         };
         let precision = Precision { tolerance: self.tolerance, ..Precision::default() };
