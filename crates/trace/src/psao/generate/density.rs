@@ -45,9 +45,10 @@ const TOGETHER: usize = 64;
 /// Keeps the hashes of pilots apart from those of points.
 const PILOT_SEED: u32 = 0x9110_7000;
 
-/// The relative density over all surfaces, an instance each.
+/// The relative density over the surfaces of what stands still.
 pub(super) struct Field {
-    pilots: Vec<Pilots>,
+    /// One an instance; `None` where density is uniform.
+    pilots: Vec<Option<Pilots>>,
 }
 
 /// Places of one instance whose relative density is known.
@@ -65,31 +66,25 @@ pub(super) struct Pilots {
 }
 
 impl Field {
-    /// Traces the pilots and distributes the points of a uniform layout among them, those of what moves and of what stands
-    /// still each for themselves: density must not move from the scene to its movers, whose every point costs bits.
+    /// Traces the pilots and distributes the points of a uniform layout among them.
+    ///
+    /// What moves keeps uniform density: what it comes near to changes, so the gradient at one time says little of it.
     pub(super) fn new(ground: &Ground<'_>, params: &GenerateParams) -> Field {
         let moving = &ground.sides.moving;
         let still = ground.tracer.only(|instance| !moving[instance]);
         let reached = moved_boxes(ground.scene, moving, params.radius_m);
-        let mut pilots: Vec<Pilots> = (0..ground.areas.len())
-            .into_par_iter()
-            .map(|instance| {
-                // What moves is seen where it is at time 0, with all that is around it.
-                let tracer = if moving[instance] { ground.tracer } else { &still };
-                let reached: &[Aabb] = if moving[instance] { &[] } else { &reached };
-                Pilots::trace(ground, instance, tracer, reached, params)
-            })
-            .collect();
-        for class in [false, true] {
-            let mut of: Vec<&mut Pilots> =
-                pilots.iter_mut().zip(moving).filter(|(_, moves)| **moves == class).map(|(p, _)| p).collect();
-            distribute(&mut of, params.adaptive);
-        }
+        let trace = |instance: usize| {
+            (!moving[instance]).then(|| Pilots::trace(ground, instance, &still, &reached, params))
+        };
+        let mut pilots: Vec<Option<Pilots>> = (0..ground.areas.len()).into_par_iter().map(trace).collect();
+        let mut of_still: Vec<&mut Pilots> = pilots.iter_mut().flatten().collect();
+        distribute(&mut of_still, params.adaptive);
         Field { pilots }
     }
 
-    pub(super) fn pilots(&self, instance: usize) -> &Pilots {
-        &self.pilots[instance]
+    /// Those of an instance, or `None` where density is uniform.
+    pub(super) fn pilots(&self, instance: usize) -> Option<&Pilots> {
+        self.pilots[instance].as_ref()
     }
 }
 
@@ -146,13 +141,11 @@ fn distribute(pilots: &mut [&mut Pilots], adaptive: f32) {
         }
     }
     let surface_m2: f64 = pilots.iter().map(|p| p.values.len() as f64 * p.share_m2).sum();
+    let dense = |value: f32, least: f32, factor: f32| (value * factor).clamp(least, MOST_DENSE);
     let points = |factor: f32| -> f64 {
         let of = |p: &&mut Pilots| {
-            let densities = p
-                .values
-                .iter()
-                .zip(&p.least)
-                .map(|(v, least)| f64::from((v * factor).clamp(*least, MOST_DENSE)));
+            let densities =
+                p.values.iter().zip(&p.least).map(|(v, least)| f64::from(dense(*v, *least, factor)));
             densities.sum::<f64>() * p.share_m2
         };
         pilots.iter().map(of).sum()
@@ -169,7 +162,7 @@ fn distribute(pilots: &mut [&mut Pilots], adaptive: f32) {
     let factor = libm::exp2f(low);
     for p in pilots.iter_mut() {
         for (value, least) in p.values.iter_mut().zip(&p.least) {
-            *value = 1.0 + adaptive * ((*value * factor).clamp(*least, MOST_DENSE) - 1.0);
+            *value = 1.0 + adaptive * (dense(*value, *least, factor) - 1.0);
         }
     }
 }

@@ -176,7 +176,7 @@ pub fn generate_points(
         .par_iter()
         .enumerate()
         .map(|(instance, area)| {
-            let pilots = field.as_ref().map(|field| field.pilots(instance));
+            let pilots = field.as_ref().and_then(|field| field.pilots(instance));
             let mut laid = lay_instance(scene, instance, area, density, r_max, params.seed, pilots);
             laid.drop_inside(scene, pose, tracer, &sides, params);
             progress(1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed));
