@@ -111,6 +111,9 @@ pub(crate) struct VisibilityArgs {
     /// Seed of all random numbers.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u32,
+    /// How far the density of points follows the gradient of visibility, at the same number of points: 0 (uniform) to 1.
+    #[arg(long, value_name = "X", default_value_t = 0.0)]
+    pub(crate) adaptive: f32,
 }
 
 /// What a server spends: on each of its steps, and on what it sends.

@@ -32,6 +32,8 @@ pub(crate) fn server_config(scene: &Scene, args: &LightArgs) -> Result<ServerCon
         generate: GenerateParams {
             points_per_m2: points * density_factor,
             seed: visibility.seed,
+            adaptive: adaptive(visibility)?,
+            radius_m,
             ..GenerateParams::default()
         },
         update: UpdateParams { rays: visibility.point_rays, rays_still: step.rays_still, radius_m },
@@ -40,6 +42,14 @@ pub(crate) fn server_config(scene: &Scene, args: &LightArgs) -> Result<ServerCon
         max_resident_points: step.max_points,
         ..ServerConfig::default()
     })
+}
+
+/// How far density follows the gradient of visibility.
+pub(crate) fn adaptive(args: &VisibilityArgs) -> Result<f32> {
+    if !(0.0..=1.0).contains(&args.adaptive) {
+        bail!("--adaptive is {}, must be 0 to 1", args.adaptive);
+    }
+    Ok(args.adaptive)
 }
 
 /// How exactly changes are sent.

@@ -20,7 +20,7 @@ use dapple_trace::rtao::{RtaoParams, trace_visibility_with_progress};
 
 use crate::args::{RenderArgs, RenderMethod, View};
 use crate::exr_file::{write_gray, write_rgb};
-use crate::light::precision;
+use crate::light::{adaptive, precision};
 use crate::picture::{sites, write_png};
 use crate::progress::Bar;
 use crate::source::{self, Loaded};
@@ -207,6 +207,8 @@ fn light(args: &RenderArgs, loaded: &Loaded) -> Result<(Server, Client)> {
         generate: GenerateParams {
             points_per_m2: args.points * density_factor,
             seed: args.visibility.seed,
+            adaptive: adaptive(&args.visibility)?,
+            radius_m,
             ..GenerateParams::default()
         },
         update: UpdateParams { rays: args.visibility.point_rays, radius_m, ..UpdateParams::default() },

@@ -55,6 +55,7 @@ impl ServerConfig {
             Some(points) if !(1..=self.generate.max_points).contains(&points) => {
                 return Err(ServerError::BadCap { points, limit: self.generate.max_points });
             }
+            Some(_) if self.generate.adaptive > 0.0 => return Err(ServerError::AdaptiveCap),
             Some(_) => drop(PointLayer::new(scene, &self.generate)?),
         }
         Ok(self.update.check()?)
@@ -102,6 +103,12 @@ pub enum ServerError {
         /// [`GenerateParams::max_points`].
         limit: u32,
     },
+    /// A cap on points with density that is not uniform.
+    #[error(
+        "density that follows visibility is weighed over all instances together, so it does not go with a cap on points: \
+         leave out one of them (--adaptive, --max-points)"
+    )]
+    AdaptiveCap,
     /// Points that came did not fit those that there are.
     #[error(transparent)]
     Layout(#[from] LayoutError),

@@ -47,8 +47,8 @@ pub(crate) struct EvalArgs {
     /// Run the small built-in setting and fail if similarity or bytes leave their bounds.
     #[arg(long, conflicts_with_all = [
         "scenes", "builtin", "suite", "detail", "animation", "methods", "frames", "size", "points", "hz", "path",
-        "seconds", "reference_rays", "supersample", "radius", "point_rays", "threshold", "seed", "ray_budget",
-        "rays_still", "budget", "preset", "max_points", "hdr_flip", "record", "ppd",
+        "seconds", "reference_rays", "supersample", "radius", "point_rays", "threshold", "seed", "adaptive",
+        "ray_budget", "rays_still", "budget", "preset", "max_points", "hdr_flip", "record", "ppd",
     ])]
     pub(crate) smoke: bool,
     /// Threads; 0 is one for each core.
@@ -133,6 +133,10 @@ pub(crate) struct Options {
     /// Seed of all random numbers [default: 1].
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u32>,
+    /// How far the density of points follows the gradient of visibility, at the same number of points: 0 (uniform) to 1
+    /// [default: 0].
+    #[arg(long, value_name = "X")]
+    pub(crate) adaptive: Option<f32>,
     /// Rays a server step may take, spent first on what is seen, on what changes and on what has waited; the rest is done
     /// in later steps [default: as many as it takes].
     #[arg(long, value_name = "RAYS")]
@@ -179,6 +183,7 @@ impl Options {
             point_rays: self.point_rays.or(other.point_rays),
             threshold: self.threshold.or(other.threshold),
             seed: self.seed.or(other.seed),
+            adaptive: self.adaptive.or(other.adaptive),
             ray_budget: self.ray_budget.or(other.ray_budget),
             rays_still: self.rays_still.or(other.rays_still),
             budget: self.budget.or(preset.map(Preset::budget)).or(other.budget),

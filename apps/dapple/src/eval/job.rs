@@ -369,6 +369,10 @@ impl Line {
             hz: pair.map(|p| p.hz),
             point_rays: pair.map(|_| settings.point_rays),
             threshold: pair.and_then(|p| p.points_per_m2).map(|_| settings.threshold),
+            adaptive: pair
+                .and_then(|p| p.points_per_m2)
+                .map(|_| settings.adaptive)
+                .filter(|adaptive| *adaptive > 0.0),
             ray_budget: pair.and_then(|p| p.points_per_m2).and(settings.step.ray_budget),
             rays_still: pair
                 .and_then(|p| p.points_per_m2)

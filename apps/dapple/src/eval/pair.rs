@@ -28,6 +28,8 @@ pub(super) struct Start {
     pub(super) tolerance: u8,
     pub(super) seed: u32,
     pub(super) max_points: Option<u32>,
+    /// How far density follows the gradient of visibility.
+    pub(super) adaptive: f32,
 }
 
 impl Start {
@@ -43,6 +45,7 @@ impl Start {
             tolerance: settings.threshold,
             seed: settings.seed,
             max_points: settings.step.max_points,
+            adaptive: settings.adaptive,
         }
     }
 
@@ -50,6 +53,8 @@ impl Start {
         let generate = GenerateParams {
             points_per_m2: self.points_per_m2,
             seed: self.seed,
+            adaptive: self.adaptive,
+            radius_m: self.update.radius_m,
             ..GenerateParams::default()
         };
         let precision = Precision { tolerance: self.tolerance, ..Precision::default() };

@@ -20,12 +20,13 @@ use serde::Serialize;
 use super::samples::{Errors, Place, SampleParams, Samples};
 use super::thin::{Side, ThinScene};
 use crate::args::QualityArgs;
+use crate::light::adaptive;
 use crate::picture::write_file;
 use crate::progress::Bar;
 use crate::source;
 
-/// Takes what was found at one density: points a m², the store, the samples, and a list a method.
-type Take<'a> = &'a mut dyn FnMut(f32, &PointStore, &Samples, Vec<Found>);
+/// Takes what was found at one density: points a m² and how far they follow the gradient, the store, the samples, and a list a method.
+type Take<'a> = &'a mut dyn FnMut((f32, f32), &PointStore, &Samples, Vec<Found>);
 
 /// Everything one run found.
 #[derive(Debug, Serialize)]
@@ -47,6 +48,8 @@ struct SurfaceRow {
     scene: String,
     points_per_m2: f32,
     points: u64,
+    /// How far density follows the gradient of visibility.
+    adaptive: f32,
     method: &'static str,
     all: Class,
     /// Fronts of what stands still, and of what the animation moves.
@@ -72,6 +75,7 @@ struct Class {
 struct LeakRow {
     scene: &'static str,
     points_per_m2: f32,
+    adaptive: f32,
     method: &'static str,
     places: u64,
     /// Mean of found − true visibility within 11 cm of the wall, on the dark and on the open side.
@@ -92,7 +96,8 @@ struct Found {
 /// What is the same for all scenes of a run.
 struct Run<'a> {
     args: &'a QualityArgs,
-    densities: Vec<f32>,
+    /// Points a m², and how far they follow the gradient of visibility. What follows it is compared with what is uniform.
+    densities: Vec<(f32, f32)>,
 }
 
 /// Runs, prints two tables and writes JSON where asked.
@@ -106,7 +111,9 @@ pub(crate) fn run(args: &QualityArgs) -> Result<()> {
     if let Some(bad) = args.points.iter().find(|n| !(n.is_finite() && **n > 0.0)) {
         bail!("--points has {bad}, must be above 0");
     }
-    let run = Run { args, densities: args.points.clone() };
+    let adaptive = adaptive(&args.visibility)?;
+    let of = |&points: &f32| [Some((points, 0.0)), (adaptive > 0.0).then_some((points, adaptive))];
+    let run = Run { args, densities: args.points.iter().flat_map(of).flatten().collect() };
     let (mut surfaces, mut leaks) = (Vec::new(), Vec::new());
     let mut radius_m = 0.6;
     if !args.leaks {
@@ -147,30 +154,37 @@ impl Run<'_> {
         factor: f32,
         rows: &mut Vec<SurfaceRow>,
     ) -> Result<()> {
-        self.each(scene, radius_m, factor, self.args.time, &mut |points_per_m2, store, samples, found| {
-            for Found { method, visibility, discarded } in found {
-                let class = |of: &dyn Fn(usize) -> bool| {
-                    let errors = Errors::over(&samples.truth, &visibility, of);
-                    Class { places: errors.places, psnr_db: errors.psnr_db() }
-                };
-                rows.push(SurfaceRow {
-                    scene: title.to_owned(),
-                    points_per_m2,
-                    points: store.layout().len() as u64,
-                    method,
-                    all: class(&|_| true),
-                    still: class(&|i| !samples.places[i].back && !samples.moving[i]),
-                    movers: class(&|i| !samples.places[i].back && samples.moving[i]),
-                    backs: class(&|i| samples.places[i].back),
-                    discarded,
-                });
-            }
-        })
+        self.each(
+            scene,
+            radius_m,
+            factor,
+            self.args.time,
+            &mut |(points_per_m2, adaptive), store, samples, found| {
+                for Found { method, visibility, discarded } in found {
+                    let class = |of: &dyn Fn(usize) -> bool| {
+                        let errors = Errors::over(&samples.truth, &visibility, of);
+                        Class { places: errors.places, psnr_db: errors.psnr_db() }
+                    };
+                    rows.push(SurfaceRow {
+                        scene: title.to_owned(),
+                        points_per_m2,
+                        points: store.layout().len() as u64,
+                        adaptive,
+                        method,
+                        all: class(&|_| true),
+                        still: class(&|i| !samples.places[i].back && !samples.moving[i]),
+                        movers: class(&|i| !samples.places[i].back && samples.moving[i]),
+                        backs: class(&|i| samples.places[i].back),
+                        discarded,
+                    });
+                }
+            },
+        )
     }
 
     fn leaks(&self, thin: &ThinScene, rows: &mut Vec<LeakRow>) -> Result<()> {
         let scene = Arc::new(thin.scene.clone());
-        self.each(&scene, 0.6, 1.0, 0.0, &mut |points_per_m2, _, samples, found| {
+        self.each(&scene, 0.6, 1.0, 0.0, &mut |(points_per_m2, adaptive), _, samples, found| {
             let sides: Vec<Option<Side>> =
                 samples.places.iter().map(|p| thin.side(p.rest.instance, p.position_world)).collect();
             for Found { method, visibility, .. } in found {
@@ -179,6 +193,7 @@ impl Run<'_> {
                 rows.push(LeakRow {
                     scene: thin.name,
                     points_per_m2,
+                    adaptive,
                     method,
                     places: near.places,
                     dark_bias: over(&|i| sides[i] == Some(Side::Dark)).bias(),
@@ -205,11 +220,13 @@ impl Run<'_> {
         let pose = scene.pose(time_s);
         let tracer = Tracer::new(scene, &pose);
         let mut samples = None;
-        for &points_per_m2 in &self.densities {
+        for &(points_per_m2, adaptive) in &self.densities {
             let bar = Bar::spinner(&format!("points, N = {points_per_m2}"));
             let generate = GenerateParams {
                 points_per_m2: points_per_m2 * factor,
                 seed: visibility.seed,
+                adaptive,
+                radius_m,
                 ..GenerateParams::default()
             };
             let points = generate_points(scene, &rest_pose, &rest_tracer, &generate, &|_| ())?;
@@ -232,7 +249,7 @@ impl Run<'_> {
             bar.message(&format!("cuts, N = {points_per_m2}"));
             let cuts = find_cuts(scene, &rest_pose, &rest_tracer, updater.store().layout(), &|_| ());
             let found = find(scene, updater.store(), &cuts, samples)?;
-            take(points_per_m2, updater.store(), samples, found);
+            take((points_per_m2, adaptive), updater.store(), samples, found);
         }
         Ok(())
     }
@@ -275,15 +292,15 @@ fn surface_table(rows: &[SurfaceRow]) -> String {
         let _ =
             writeln!(text, "{}: {all} places on surfaces, {backs} on backs, {movers} on movers\n", row.scene);
     }
-    text.push_str("| N | points | method | all dB | static dB | movers dB | backs dB | points discarded |\n|---|---|---|---|---|---|---|---|\n");
+    text.push_str("| N | points | adaptive | method | all dB | static dB | movers dB | backs dB | points discarded |\n|---|---|---|---|---|---|---|---|---|\n");
     for row in rows {
-        let SurfaceRow { points_per_m2, points, method, .. } = row;
+        let SurfaceRow { points_per_m2, points, adaptive, method, .. } = row;
         let [all, still, movers, backs] =
             [&row.all, &row.still, &row.movers, &row.backs].map(|c| db(c.psnr_db));
         let discarded = row.discarded.map_or_else(|| "–".to_owned(), |d| d.to_string());
         let _ = writeln!(
             text,
-            "| {points_per_m2} | {points} | {method} | {all} | {still} | {movers} | {backs} | {discarded} |"
+            "| {points_per_m2} | {points} | {adaptive} | {method} | {all} | {still} | {movers} | {backs} | {discarded} |"
         );
     }
     text
@@ -293,15 +310,15 @@ fn surface_table(rows: &[SurfaceRow]) -> String {
 fn leak_table(rows: &[LeakRow]) -> String {
     let signed = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |v| format!("{v:+.3}"));
     let mut text = String::from(
-        "| scene | N | method | places | dark side | open side | near the wall dB | all dB |\n|---|---|---|---|---|---|---|---|\n",
+        "| scene | N | adaptive | method | places | dark side | open side | near the wall dB | all dB |\n|---|---|---|---|---|---|---|---|---|\n",
     );
     for row in rows {
-        let LeakRow { scene, points_per_m2, method, places, .. } = row;
+        let LeakRow { scene, points_per_m2, adaptive, method, places, .. } = row;
         let (dark, open) = (signed(row.dark_bias), signed(row.open_bias));
         let (near, all) = (db(row.near_psnr_db), db(row.all_psnr_db));
         let _ = writeln!(
             text,
-            "| {scene} | {points_per_m2} | {method} | {places} | {dark} | {open} | {near} | {all} |"
+            "| {scene} | {points_per_m2} | {adaptive} | {method} | {places} | {dark} | {open} | {near} | {all} |"
         );
     }
     text

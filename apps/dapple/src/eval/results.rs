@@ -231,6 +231,9 @@ pub(crate) struct Params {
     pub(crate) point_rays: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) threshold: Option<u8>,
+    /// How far the density of points follows the gradient of visibility; absent where it is uniform.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) adaptive: Option<f32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) ray_budget: Option<u64>,
     #[serde(skip_serializing_if = "Option::is_none")]

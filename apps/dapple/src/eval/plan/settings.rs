@@ -27,6 +27,7 @@ pub(in crate::eval) struct Settings {
     pub(in crate::eval) point_rays: u32,
     pub(in crate::eval) threshold: u8,
     pub(in crate::eval) seed: u32,
+    pub(in crate::eval) adaptive: f32,
     pub(in crate::eval) step: StepArgs,
     pub(in crate::eval) hdr_flip: bool,
 }
@@ -61,6 +62,7 @@ impl Settings {
             point_rays: options.point_rays.unwrap_or(64),
             threshold: options.threshold.unwrap_or(4),
             seed: options.seed.unwrap_or(1),
+            adaptive: options.adaptive.unwrap_or(0.0),
             step: StepArgs {
                 ray_budget: options.ray_budget,
                 rays_still: options.rays_still.unwrap_or(0),
@@ -88,6 +90,9 @@ impl Settings {
         }
         if self.threshold > 127 {
             bail!("--threshold is {}, must be 0 to 127", self.threshold);
+        }
+        if !(0.0..=1.0).contains(&self.adaptive) {
+            bail!("--adaptive is {}, must be 0 to 1", self.adaptive);
         }
         if !(1..=65536).contains(&self.reference_rays) {
             bail!("--reference-rays is {}, must be 1 to 65536", self.reference_rays);

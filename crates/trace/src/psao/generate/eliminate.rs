@@ -8,6 +8,9 @@ use glam::Vec3;
 pub(super) struct Candidate {
     pub(super) position: Vec3,
     pub(super) normal: Vec3,
+    /// The distance that it should keep, relative to that of the rest: 1 for all where density is uniform, else
+    /// 1/√(relative density).
+    pub(super) scale: f32,
 }
 
 /// [Yuksel2015] eq. 5: β and γ of weight limiting.
@@ -29,11 +32,12 @@ pub(super) fn eliminate(candidates: &[Candidate], keep: usize, r_max: f32) -> Ve
         return (0..count as u32).collect();
     }
     let reach = 2.0 * r_max;
+    let widest = candidates.iter().map(|c| c.scale).fold(0.0, f32::max);
     let ratio = keep as f32 / count as f32;
     let r_min = r_max * (1.0 - libm::powf(ratio, GAMMA)) * BETA;
 
     let positions: Vec<Vec3> = candidates.iter().map(|c| c.position).collect();
-    let grid = CellGrid::new(&positions, reach);
+    let grid = CellGrid::new(&positions, reach * widest);
     // Pairs are found again when one is eliminated instead of being kept: coincident surfaces have too many.
     let mut near = Near { grid: &grid, cell: None, indices: Vec::new() };
     let weights = candidates
@@ -78,7 +82,8 @@ impl Near<'_> {
         }
         self.indices.iter().filter_map(move |&j| {
             let b = &candidates[j as usize];
-            let distance = a.position.distance(b.position);
+            // Distances are measured in what both should keep; dividing by 1 changes no bit.
+            let distance = a.position.distance(b.position) / (0.5 * (a.scale + b.scale));
             if j as usize == i || distance >= reach || a.normal.dot(b.normal) <= 0.0 {
                 return None;
             }
@@ -169,7 +174,11 @@ mod tests {
     fn unit_square(count: u32, seed: u64) -> Vec<Candidate> {
         let unit = |i: u32, d: u32| hash(seed, u64::from(i), d) as f32 / 4_294_967_296.0;
         (0..count)
-            .map(|i| Candidate { position: Vec3::new(unit(i, 0), 0.0, unit(i, 1)), normal: Vec3::Y })
+            .map(|i| Candidate {
+                position: Vec3::new(unit(i, 0), 0.0, unit(i, 1)),
+                normal: Vec3::Y,
+                scale: 1.0,
+            })
             .collect()
     }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use dapple_scene::{Pose, Scene};
 use dapple_store::points::{MAX_COORDINATE, PointLayout};
 
+use super::density::Pilots;
 use super::{
     GenerateError, GenerateParams, GeneratedPoints, LaidInstance, Sides, SurfaceArea, lay_instance,
     maximum_radius, measure,
@@ -13,7 +14,8 @@ use crate::Tracer;
 
 /// What all instances have in common: lengths of the layout, and how much surface each has.
 ///
-/// What it lays depends on the scene, the parameters and the instance alone, so sets that were laid at different times fit each other.
+/// What it lays depends on the scene, the parameters and the instance alone, so sets that were laid at different times fit each other. So
+/// density is uniform: what follows the gradient of visibility ([`GenerateParams::adaptive`]) is weighed over all instances together.
 #[derive(Clone, Debug)]
 pub struct PointLayer {
     params: GenerateParams,
@@ -82,8 +84,13 @@ impl PointLayer {
             return Err(GenerateError::TooManyPoints { points_per_m2, area_m2, points, limit });
         }
         let there: Vec<usize> = there().collect();
-        let laid = there.into_par_iter().map(|instance| self.lay_one(scene, pose, tracer, instance));
+        let laid = there.into_par_iter().map(|instance| self.lay_one(scene, pose, tracer, instance, None));
         self.join(laid.collect())
+    }
+
+    /// What the inside test knows of each instance.
+    pub(super) fn sides(&self) -> &Sides {
+        &self.sides
     }
 
     pub(super) fn lay_one(
@@ -92,10 +99,11 @@ impl PointLayer {
         pose: &Pose,
         tracer: &Tracer,
         instance: usize,
+        pilots: Option<&Pilots>,
     ) -> LaidInstance {
         let area = SurfaceArea::measure(scene, instance);
         let (density, seed) = (self.params.points_per_m2, self.params.seed);
-        let mut laid = lay_instance(scene, instance, &area, density, self.r_max, seed);
+        let mut laid = lay_instance(scene, instance, &area, density, self.r_max, seed, pilots);
         laid.drop_inside(scene, pose, tracer, &self.sides, &self.params);
         laid
     }

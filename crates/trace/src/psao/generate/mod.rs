@@ -4,6 +4,7 @@
 //! ends hold and, for the server alone, each point's [`Anchor`].
 
 mod anchor;
+mod density;
 mod eliminate;
 mod layer;
 #[cfg(test)]
@@ -19,6 +20,7 @@ use rayon::prelude::*;
 
 pub use anchor::Anchor;
 pub(crate) use anchor::{PosedPoint, pose_anchor};
+use density::{Field, MOST_DENSE, Pilots};
 use eliminate::{Candidate, eliminate, maximum_radius};
 pub use layer::PointLayer;
 
@@ -40,6 +42,12 @@ pub struct GenerateParams {
     pub inside_rays: u32,
     /// Seed of the random places.
     pub seed: u32,
+    /// How far density follows the gradient of visibility at time 0, at the same number of points: 0 (default) uniform … 1 from
+    /// half of the mean density to twice.
+    pub adaptive: f32,
+    /// Length in metres of the rays that find the gradient; should be that of [`UpdateParams`](super::update::UpdateParams).
+    /// Default 0.6. Means nothing where `adaptive` is 0.
+    pub radius_m: f32,
 }
 
 impl Default for GenerateParams {
@@ -50,6 +58,8 @@ impl Default for GenerateParams {
             inside_fraction: 0.5,
             inside_rays: 64,
             seed: 0,
+            adaptive: 0.0,
+            radius_m: 0.6,
         }
     }
 }
@@ -94,6 +104,9 @@ pub enum GenerateError {
     /// The density is not a positive finite number.
     #[error("points per m² is {0}, must be positive and finite")]
     BadDensity(f32),
+    /// How far density follows the gradient is not in 0 … 1.
+    #[error("adaptive is {0}, must be 0 (uniform density) to 1")]
+    BadAdaptive(f32),
     /// The scene's surface times the density is too much.
     #[error(
         "{points_per_m2} points per m² on {area_m2:.0} m² of surface would give {points} points, at most {limit} are \
@@ -120,6 +133,9 @@ pub enum GenerateError {
 /// The density is no number above 0, or would give too many points.
 pub fn check_density(scene: &Scene, params: &GenerateParams) -> Result<(), GenerateError> {
     let density = params.points_per_m2;
+    if !(0.0..=1.0).contains(&params.adaptive) {
+        return Err(GenerateError::BadAdaptive(params.adaptive));
+    }
     let area_m2: f64 = measure(scene, density)?.iter().map(|(area, _)| area).sum();
     let limit = params.max_points.min(MAX_POINTS);
     let points = (0.5 * area_m2 * f64::from(density)) as u64;
@@ -154,16 +170,31 @@ pub fn generate_points(
 ) -> Result<GeneratedPoints, GenerateError> {
     check_density(scene, params)?;
     let layer = PointLayer::new(scene, params)?;
+    let field = (params.adaptive > 0.0).then(|| {
+        let areas: Vec<SurfaceArea> =
+            (0..scene.instances.len()).into_par_iter().map(|i| SurfaceArea::measure(scene, i)).collect();
+        Field::new(&Ground { scene, pose, tracer, areas: &areas, sides: layer.sides() }, params)
+    });
     let done = std::sync::atomic::AtomicUsize::new(0);
     let laid: Vec<LaidInstance> = (0..scene.instances.len())
         .into_par_iter()
         .map(|instance| {
-            let laid = layer.lay_one(scene, pose, tracer, instance);
+            let pilots = field.as_ref().and_then(|field| field.pilots(instance));
+            let laid = layer.lay_one(scene, pose, tracer, instance, pilots);
             progress(1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed));
             laid
         })
         .collect();
     layer.join(laid)
+}
+
+/// What points are laid on.
+struct Ground<'a> {
+    scene: &'a Scene,
+    pose: &'a Pose,
+    tracer: &'a Tracer,
+    areas: &'a [SurfaceArea],
+    sides: &'a Sides,
 }
 
 /// Rest-space area of an instance's triangles, as a running sum.
@@ -257,12 +288,25 @@ fn lay_instance(
     density: f32,
     r_max: f32,
     seed: u32,
+    pilots: Option<&Pilots>,
 ) -> LaidInstance {
     let mut points = Vec::new();
     if area.total > 0.0 {
-        let spawned = spawn(scene, instance, area, density, seed);
-        let candidates: Vec<Candidate> =
-            spawned.iter().map(|p| Candidate { position: p.position_rest, normal: p.normal_rest }).collect();
+        let (spawned, scales) = match pilots {
+            None => (spawn(scene, instance, area, density, seed, |_| true), None),
+            Some(pilots) => {
+                // As dense as it is anywhere; of each place the share that its density asks for.
+                let mut share = density::Share::new(pilots);
+                let spawned = spawn(scene, instance, area, density * MOST_DENSE, seed, |p| share.takes(p));
+                (spawned, Some(share.into_scales()))
+            }
+        };
+        let scale = |i: usize| scales.as_ref().map_or(1.0, |scales| scales[i]);
+        let candidates: Vec<Candidate> = spawned
+            .iter()
+            .enumerate()
+            .map(|(i, p)| Candidate { position: p.position_rest, normal: p.normal_rest, scale: scale(i) })
+            .collect();
         let kept = eliminate(&candidates, spawned.len().div_ceil(2), r_max);
         let mut stays = vec![false; spawned.len()];
         for &i in &kept {
@@ -273,15 +317,22 @@ fn lay_instance(
     LaidInstance { instance, points, dropped: 0 }
 }
 
-/// Random places, uniform by area: one in each of equal strata of the running area.
-fn spawn(scene: &Scene, instance: usize, area: &SurfaceArea, density: f32, seed: u32) -> Vec<LaidPoint> {
+/// Random places, uniform by area: one in each of equal strata of the running area. Those that `takes` refuses are left out.
+fn spawn(
+    scene: &Scene,
+    instance: usize,
+    area: &SurfaceArea,
+    density: f32,
+    seed: u32,
+    mut takes: impl FnMut(&LaidPoint) -> bool,
+) -> Vec<LaidPoint> {
     let placed = &scene.instances[instance];
     let mesh = &scene.meshes[placed.mesh as usize];
     // Even the smallest thing gets a point, or it would have no visibility at all.
     let count = (area.total * f64::from(density)).ceil().max(2.0) as u32;
     let stream = u64::from(seed) << 32 | instance as u64;
     let unit = |i: u32, dimension: u32| f64::from(hash(stream, u64::from(i), dimension)) / 4_294_967_296.0;
-    let mut spawned = Vec::with_capacity(count as usize);
+    let mut spawned = Vec::new();
     let mut triangle = 0usize;
     for i in 0..count {
         let at = (f64::from(i) + unit(i, 0)) / f64::from(count) * area.total;
@@ -303,17 +354,16 @@ fn spawn(scene: &Scene, instance: usize, area: &SurfaceArea, density: f32, seed:
         let Some(point) = pose_anchor(&anchor, corners, placed.rest_from_mesh.determinant() < 0.0) else {
             continue;
         };
-        spawned.push(LaidPoint { anchor, position_rest: point.position, normal_rest: point.normal });
+        let point = LaidPoint { anchor, position_rest: point.position, normal_rest: point.normal };
+        if takes(&point) {
+            spawned.push(point);
+        }
     }
     spawned
 }
 
 impl LaidInstance {
-    /// Drops points that lie inside geometry that never moves against them.
-    ///
-    /// Their visibility is dark whatever happens and would bleed into visible surfaces near them. For a point that
-    /// stands still that is all still geometry, for one that moves its own instance. A double-sided
-    /// surface has no inside.
+    /// Drops points that lie inside.
     fn drop_inside(
         &mut self,
         scene: &Scene,
@@ -322,9 +372,29 @@ impl LaidInstance {
         sides: &Sides,
         params: &GenerateParams,
     ) {
+        let Some(inside) = self.find_inside(scene, pose, tracer, sides, params) else { return };
+        let before = self.points.len();
+        let mut inside = inside.into_iter();
+        self.points.retain(|_| !inside.next().unwrap_or(false));
+        self.dropped = (before - self.points.len()) as u32;
+    }
+
+    /// Which points lie inside geometry that never moves against them; `None`: none of them.
+    ///
+    /// Their visibility is dark whatever happens and would bleed into visible surfaces near them. For a point that
+    /// stands still that is all still geometry, for one that moves its own instance. A double-sided
+    /// surface has no inside.
+    fn find_inside(
+        &self,
+        scene: &Scene,
+        pose: &Pose,
+        tracer: &Tracer,
+        sides: &Sides,
+        params: &GenerateParams,
+    ) -> Option<Vec<bool>> {
         let rays = params.inside_rays.min(256);
         if rays == 0 {
-            return;
+            return None;
         }
         let instance = self.instance;
         // Of which instances a back face means "inside" for these points.
@@ -333,7 +403,7 @@ impl LaidInstance {
             false => !sides.moving[other] && sides.single[other],
         };
         if !(counts(instance) || sides.any_still && !sides.moving[instance]) {
-            return;
+            return None;
         }
         let is_back = |origin_world: Vec3, direction_world: Vec3| {
             let hit = tracer.closest_hit(&Ray { origin_world, direction_world, t_max: f32::MAX });
@@ -354,11 +424,7 @@ impl LaidInstance {
                 is_back(origin_world, tangent * d.x + bitangent * d.y + posed.normal * d.z)
             })
         };
-        let inside: Vec<bool> = self.points.par_iter().map_init(Vec::new, is_inside).collect();
-        let before = self.points.len();
-        let mut inside = inside.into_iter();
-        self.points.retain(|_| !inside.next().unwrap_or(false));
-        self.dropped = (before - self.points.len()) as u32;
+        Some(self.points.par_iter().map_init(Vec::new, is_inside).collect())
     }
 
     fn bounds(&self) -> (Vec3, Vec3) {

@@ -165,3 +165,109 @@ fn a_scene_without_surface_has_no_points() {
     let (scene, pose) = scene_of(quad(Vec3::ONE, Vec3::ONE, Vec3::ONE, Vec3::ONE));
     assert!(generate(&scene, &pose, &GenerateParams::default()).layout.is_empty());
 }
+
+/// A floor of 4 m with a cube of 0.6 m on its middle.
+fn box_on_a_floor() -> (Scene, Pose) {
+    let stand = Affine3A::from_translation(Vec3::new(1.7, 0.0, 1.7)) * Affine3A::from_scale(Vec3::splat(0.6));
+    scene(vec![floor(4.0), cube()], &[(0, Affine3A::IDENTITY), (1, stand)])
+}
+
+const ADAPTIVE: GenerateParams = GenerateParams {
+    points_per_m2: 512.0,
+    max_points: 1_000_000,
+    inside_fraction: 0.5,
+    inside_rays: 64,
+    seed: 0,
+    adaptive: 1.0,
+    radius_m: 0.6,
+};
+
+#[test]
+fn adaptive_points_are_as_many_and_denser_where_visibility_changes() {
+    let (scene, pose) = box_on_a_floor();
+    let uniform = generate(&scene, &pose, &GenerateParams { adaptive: 0.0, ..ADAPTIVE });
+    let adaptive = generate(&scene, &pose, &ADAPTIVE);
+    let (of_uniform, of_adaptive) = (uniform.layout.len() as f32, adaptive.layout.len() as f32);
+    assert!((of_adaptive / of_uniform - 1.0).abs() < 0.02, "{of_adaptive} points instead of {of_uniform}");
+    assert_eq!(uniform.layout.spacing_m().to_bits(), adaptive.layout.spacing_m().to_bits());
+
+    let set = adaptive.layout.set_of_instance(0).unwrap();
+    let places: Vec<Vec3> =
+        (0..set.len()).map(|i| set.position_rest(i, adaptive.layout.quantum_m())).collect();
+    // Distance to the cube's foot, in the norm that makes squares of what is equally far.
+    let from_box = |p: &Vec3| (p.x - 2.0).abs().max((p.z - 2.0).abs()) - 0.3;
+    let per_m2 = |low: f32, high: f32| {
+        let count = places.iter().filter(|p| (low..high).contains(&from_box(p))).count();
+        let edge = |d: f32| (0.6 + 2.0 * d) * (0.6 + 2.0 * d);
+        count as f32 / (edge(high) - edge(low))
+    };
+    let (near, far) = (per_m2(0.02, 0.3), per_m2(1.0, 1.7));
+    assert!(near > 1.5 * far && far > 0.0, "{near} a m² near the box, {far} far from it");
+    // Between the bounds, and so are the distances: a share of what the density there would allow at most.
+    assert!(far > 0.4 * 256.0 && near < 2.2 * 256.0, "{near} and {far} a m², 256 uniform");
+    let spacing_m = adaptive.layout.spacing_m();
+    for (i, p) in places.iter().enumerate() {
+        let local_m = spacing_m / if from_box(p) < 0.6 { 2.0f32.sqrt() } else { 1.0 };
+        let nearest = places[i + 1..].iter().map(|q| q.distance(*p)).fold(f32::INFINITY, f32::min);
+        assert!(nearest > 0.3 * local_m, "{nearest} m at {p}, spacing {local_m} m");
+    }
+}
+
+#[test]
+fn adaptive_points_are_the_same_on_any_number_of_threads() {
+    let (scene, pose) = box_on_a_floor();
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| generate(&scene, &pose, &ADAPTIVE))
+    };
+    let (one, three) = (on(1), on(3));
+    assert_eq!(one.layout, three.layout);
+    assert_eq!(one.anchors, three.anchors);
+    let half = generate(&scene, &pose, &GenerateParams { adaptive: 0.5, ..ADAPTIVE });
+    assert_ne!(half.layout, one.layout);
+}
+
+#[test]
+fn adaptive_points_on_scenes_without_any_gradient() {
+    let (open, pose) = scene_of(floor(2.0));
+    let points = generate(&open, &pose, &ADAPTIVE);
+    let count = points.layout.len();
+    assert!((1003..=1045).contains(&count), "{count} points instead of 1024");
+    let set = &points.layout.sets()[0];
+    let in_quarter = (0..set.len())
+        .map(|i| set.position_rest(i, points.layout.quantum_m()))
+        .filter(|p| p.x < 1.0 && p.z < 1.0)
+        .count();
+    assert!((236..=276).contains(&in_quarter), "{in_quarter} of {count} in one quarter");
+
+    let one = crate::test_support::mesh(vec![Vec3::ZERO, Vec3::Z, Vec3::X], vec![[0, 1, 2]]);
+    let (one, pose) = scene_of(one);
+    let count = generate(&one, &pose, &ADAPTIVE).layout.len();
+    assert!((125..=131).contains(&count), "{count} points on half a square metre");
+    let (grain, pose) = scene(vec![cube()], &[(0, Affine3A::from_scale(Vec3::splat(1e-4)))]);
+    assert_eq!(generate(&grain, &pose, &ADAPTIVE).layout.len(), 1);
+    let (nothing, pose) = scene_of(quad(Vec3::ONE, Vec3::ONE, Vec3::ONE, Vec3::ONE));
+    assert!(generate(&nothing, &pose, &ADAPTIVE).layout.is_empty());
+    // Rays of no length or without end, and many surfaces in one place.
+    let (scene, pose) = box_on_a_floor();
+    let uniform = generate(&scene, &pose, &GenerateParams { adaptive: 0.0, ..ADAPTIVE }).layout.len() as f32;
+    for radius_m in [0.0, f32::NAN, f32::INFINITY] {
+        let count = generate(&scene, &pose, &GenerateParams { radius_m, ..ADAPTIVE }).layout.len() as f32;
+        assert!(
+            (count / uniform - 1.0).abs() < 0.02,
+            "{count} points instead of {uniform}, radius {radius_m}"
+        );
+    }
+    let (piled, pose) = scene_of(crate::test_support::joined(vec![floor(0.5); 8]));
+    let count = generate(&piled, &pose, &ADAPTIVE).layout.len();
+    assert!((500..=524).contains(&count), "{count} points instead of 512");
+}
+
+#[test]
+fn adaptive_out_of_range_is_refused() {
+    let (scene, _) = box_on_a_floor();
+    for adaptive in [-0.1, 1.1, f32::NAN] {
+        let refused = check_density(&scene, &GenerateParams { adaptive, ..ADAPTIVE });
+        assert!(matches!(refused, Err(GenerateError::BadAdaptive(_))), "{adaptive}: {refused:?}");
+    }
+}
