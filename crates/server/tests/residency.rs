@@ -121,6 +121,10 @@ fn a_cap_out_of_range_is_refused_and_a_scene_beyond_the_limit_is_not() {
         let error = Server::new(scene.clone(), &config(Some(cap)), &|_| ()).err().unwrap();
         assert!(matches!(error, ServerError::BadCap { points, .. } if points == cap), "{error}");
     }
+    let mut uneven = config(Some(200));
+    uneven.generate.adaptive = 0.5;
+    let refusals = [uneven.check(&scene).err(), Server::new(scene.clone(), &uneven, &|_| ()).err()];
+    assert!(refusals.iter().all(|error| matches!(error, Some(ServerError::AdaptiveCap))), "{refusals:?}");
     let mut dense = config(Some(200));
     dense.generate.max_points = 300;
     assert!(
