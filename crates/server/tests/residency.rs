@@ -87,8 +87,9 @@ fn who_listens_follows_what_comes_and_goes() {
         assert!(spawned > 8 && evicted > 8 && sets >= 8 && most > 200, "{spawned} {evicted} {sets} {most}");
         assert!(evicted < 40, "{evicted}: nothing takes turns");
         if let Some(bits) = bits_per_s {
+            // What comes and goes is not counted.
             let most = delta_bytes.windows(30).map(|second| 8 * second.iter().sum::<u64>()).max();
-            assert!(most.is_some_and(|most| most <= bits && most > 0), "{most:?}");
+            assert!(most.is_some_and(|most| most <= bits), "{most:?}");
         }
         frames
     };

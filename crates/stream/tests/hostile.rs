@@ -317,10 +317,14 @@ fn rules_of_changes_of_sets_are_enforced() {
     let exact = Limits {
         max_points: points.max(before) as u32,
         max_sets: sets as u32,
-        max_cuts: 600,
+        // Those of the sample, and one that comes.
+        max_cuts: 601,
         ..Limits::default()
     };
-    assert!(at_most(exact).is_ok());
+    let applied = at_most(exact);
+    assert!(applied.is_ok(), "{applied:?}");
+    let fewer_cuts = at_most(Limits { max_cuts: 600, ..exact });
+    assert!(matches!(fewer_cuts, Err(ReceiveError::Decode(DecodeError::TooLarge { .. }))));
     if points > before {
         let less = Limits { max_points: points as u32 - 1, ..exact };
         assert!(matches!(at_most(less), Err(ReceiveError::Decode(DecodeError::TooLarge { .. }))));

@@ -24,6 +24,8 @@ pub struct Budget {
 const PARTS_PER_S: f64 = 5.0;
 /// Never more: frames that are far apart leave something too.
 const MOST_PART: f64 = 0.4;
+/// Never less, as far as so much is left: a frame that is much shorter says next to nothing for its envelope.
+const LEAST_BYTES: u64 = 400;
 /// Before it is known how far apart frames are.
 const FIRST_PART: f64 = 0.25;
 /// Times this far apart are the same, seconds: sums of steps do not come out at whole seconds.
@@ -72,7 +74,7 @@ impl Budget {
         }
         let left = (self.bits_per_s / 8).saturating_sub(self.sent_bytes);
         let part = if self.step_s > 0.0 { (PARTS_PER_S * self.step_s).min(MOST_PART) } else { FIRST_PART };
-        (left as f64 * part) as usize // saturates
+        ((left as f64 * part) as u64).max(left.min(LEAST_BYTES)) as usize
     }
 
     /// Takes note of a frame that was sent at the time of the last [`Budget::allowance`].
@@ -134,17 +136,17 @@ mod tests {
 
     #[test]
     fn a_clock_that_goes_back_neither_gives_nor_takes() {
-        let mut budget = Budget::new(8000);
+        let mut budget = Budget::new(80_000);
         let first = budget.allowance(5.0);
         budget.spend(first);
-        assert_eq!(budget.allowance(5.0), (1000 - first) / 4, "the same time");
-        assert_eq!(budget.allowance(f64::NAN), (1000 - first) / 4);
-        assert_eq!(budget.allowance(6.0), 400, "a second later all is there again");
-        budget.spend(400);
-        assert_eq!(budget.allowance(0.5), 400, "as long after it as the one before");
-        budget.spend(400);
-        assert_eq!(budget.allowance(0.6), 300, "and the clock goes on from there");
-        let less = budget.with_bits_per_s(4000).allowance(0.6);
-        assert_eq!(less, 50, "what was sent counts");
+        assert_eq!((first, budget.allowance(5.0)), (2500, 7500 / 4), "the same time");
+        assert_eq!(budget.allowance(f64::NAN), 7500 / 4);
+        assert_eq!(budget.allowance(6.0), 4000, "a second later all is there again");
+        budget.spend(4000);
+        assert_eq!(budget.allowance(0.5), 4000, "as long after it as the one before");
+        budget.spend(4000);
+        assert_eq!(budget.allowance(0.6), 2400, "and the clock goes on from there");
+        let mut less = budget.with_bits_per_s(40_000);
+        assert_eq!(less.allowance(0.6), 400, "what was sent counts, and a short frame is better than none");
     }
 }

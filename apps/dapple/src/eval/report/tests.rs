@@ -435,7 +435,7 @@ fn a_page_is_made_again_from_its_results() {
         refusal("{\"schema\": 1}")
             .contains(&format!("has schema 1, this program reads {SCHEMA}: evaluate again"))
     );
-    assert!(refusal("{\"schema\": 3}").contains("is damaged"));
+    assert!(refusal(&format!("{{\"schema\": {SCHEMA}}}")).contains("is damaged"));
     assert!(refusal("# notes").contains("is not the results.json of an evaluation"));
     assert!(format!("{:#}", rebuild(&folder.path().join("none"), None).unwrap_err()).contains("cannot read"));
 }

@@ -66,7 +66,8 @@ proptest! {
         // What a card would have pages of.
         let mut shown = std::collections::BTreeSet::new();
         let mut ask = |atlas: &mut VisibilityAtlas| {
-            atlas.take_gone().into_iter().for_each(|instance| assert!(shown.remove(&instance)));
+            // Also such as came and went between two calls.
+            atlas.take_gone().iter().for_each(|instance| drop(shown.remove(instance)));
             shown.extend(atlas.take_ready());
             let ready = (0..4).filter(|i| !atlas.placements(*i).is_empty()).collect();
             assert_eq!(shown, ready);
