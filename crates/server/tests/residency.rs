@@ -44,7 +44,7 @@ fn who_listens_follows_what_comes_and_goes() {
     const CAP: u32 = 260;
     let run = |budget: Option<u64>, bits_per_s: Option<u64>| {
         let first = look(5.0);
-        let input = StepInput { interest: &first, ray_budget: budget, ..StepInput::default() };
+        let input = StepInput { interest: &first, ray_budget: budget };
         let config = ServerConfig { bits_per_s, ..config(Some(CAP)) };
         let mut server = Server::watched(scene.clone(), &config, &input, &|_| ()).unwrap();
         assert!(server.too_large().contains(&0), "the floor has some 800 points");

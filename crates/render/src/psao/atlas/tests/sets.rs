@@ -67,7 +67,9 @@ proptest! {
         let mut shown = std::collections::BTreeSet::new();
         let mut ask = |atlas: &mut VisibilityAtlas| {
             // Also such as came and went between two calls.
-            atlas.take_gone().iter().for_each(|instance| drop(shown.remove(instance)));
+            for instance in atlas.take_gone() {
+                shown.remove(&instance);
+            }
             shown.extend(atlas.take_ready());
             let ready = (0..4).filter(|i| !atlas.placements(*i).is_empty()).collect();
             assert_eq!(shown, ready);

@@ -32,7 +32,7 @@ proptest! {
         let params = UpdateParams { rays: 40, rays_still, radius_m: 0.5 };
         let (mut tracer, mut updater) = start_at(&scene, &pose, params, 40.0);
         let interest = halves(x);
-        let input = StepInput { ray_budget: Some(rays), interest: &interest[..1], ..FREE };
+        let input = StepInput { ray_budget: Some(rays), interest: &interest[..1] };
         let mut step = |pose: &Pose| {
             tracer.update(&scene, pose);
             let report = updater.step(&scene, pose, &mut tracer, &input);
@@ -68,7 +68,7 @@ fn nothing_waits_for_ever() {
     // The wall jumps once, in the half that nobody sees.
     let wall = Vec3::new(0.5, 0.0, 2.5);
     pose.instances[1].world_from_mesh.translation = wall.into();
-    let input = StepInput { ray_budget: Some(3000), interest: &interest[..1], ..FREE };
+    let input = StepInput { ray_budget: Some(3000), interest: &interest[..1] };
     let rays_of_all = updater.store().layout().len() as u64 * 64;
     // What has waited longest comes first but for a head start; each cluster can come in between once a step until then.
     let most = MOST_HEAD_START + (2 * rays_of_all / 3000) as u32;
@@ -108,7 +108,7 @@ fn what_is_seen_comes_first() {
     for (seen, unseen) in [(0, 1), (1, 0)] {
         let mut updater = updater.clone();
         let interest = &halves(1.0)[seen..=seen];
-        let input = StepInput { ray_budget: Some(need.rays() / 8), interest, ..FREE };
+        let input = StepInput { ray_budget: Some(need.rays() / 8), interest };
         updater.select(&scene, &pose, &mut tracer, &input);
         let chosen_unseen = |updater: &Updater, of: fn(&Cluster) -> u64| {
             let outside =
@@ -150,7 +150,7 @@ fn the_same_on_any_number_of_threads() {
                 pose.instances[2].world_from_mesh = Affine3A::from_translation(Vec3::new(x, 0.3, 1.2));
                 tracer.update(&scene, &pose);
                 let ray_budget = if step == 7 { None } else { Some(9_000 + 3_000 * step) };
-                let input = StepInput { ray_budget, interest: &interest[..1], ..FREE };
+                let input = StepInput { ray_budget, interest: &interest[..1] };
                 reports.push(updater.step(&scene, &pose, &mut tracer, &input));
             }
             (reports, updater.store().clone())
