@@ -1,6 +1,7 @@
 //! Command-line arguments.
 
 pub(crate) mod bake;
+mod bit_rate;
 mod eval;
 mod verbs;
 mod view;
@@ -13,6 +14,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
 
 pub(crate) use bake::BakeArgs;
+pub(crate) use bit_rate::BitRate;
 pub(crate) use eval::{EvalArgs, Options, ScenesArgs};
 pub(crate) use verbs::{CompareArgs, DiffArgs, ErrorMap, EvalVerb, JudgeArgs, PictureFormat, ReferenceArgs};
 pub(crate) use view::{Preset, ViewArgs, ViewKind};
@@ -135,36 +137,6 @@ pub(crate) struct StepArgs {
     /// says what is seen, the largest instances have points [default: all points of all instances are there throughout].
     #[arg(long, value_name = "N")]
     pub(crate) max_points: Option<u32>,
-}
-
-/// Bits a second.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct BitRate(pub(crate) u64);
-
-impl FromStr for BitRate {
-    type Err = String;
-
-    fn from_str(s: &str) -> Result<Self, Self::Err> {
-        let (number, unit) = match s.as_bytes().last() {
-            Some(b'k' | b'K') => (&s[..s.len() - 1], 1e3),
-            Some(b'm' | b'M') => (&s[..s.len() - 1], 1e6),
-            _ => (s, 1.0),
-        };
-        match number.parse::<f64>().map(|number| number * unit) {
-            // Less than a frame a second says nothing.
-            Ok(bits) if (1000.0..=1e12).contains(&bits) => Ok(BitRate(bits.round() as u64)),
-            _ => Err("write bits a second, 1k to 1000000M, as in 500k, 0.5M or 2M".into()),
-        }
-    }
-}
-
-impl std::fmt::Display for BitRate {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self.0 as f64 {
-            bits if bits >= 1e6 => write!(f, "{}M", bits / 1e6),
-            bits => write!(f, "{}k", bits / 1e3),
-        }
-    }
 }
 
 #[derive(Debug, Clone, Args)]

@@ -9,8 +9,10 @@ mod ranks;
 mod snapshot;
 mod start;
 
+#[cfg(feature = "publish")]
+pub(crate) use delta::LEAF;
 pub use delta::ValueChange;
-pub(crate) use delta::{Guide, LEAF, MOST_FOLLOW, Scale, Scratch, code_changes};
+pub(crate) use delta::{Guide, MOST_FOLLOW, Scale, Scratch, code_changes};
 #[cfg(feature = "publish")]
 pub(crate) use goal::{Fit, Goal, Tolerances};
 pub(crate) use near::Near;
