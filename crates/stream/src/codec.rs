@@ -19,7 +19,7 @@ mod values;
 pub(crate) mod varint;
 
 pub(crate) use decode::{
-    DecodedLayout, decode_changes, decode_layout, decode_values, parse_delta, parse_snapshot,
+    DecodedLayout, DeltaParts, decode_changes, decode_layout, decode_values, parse_delta, parse_snapshot,
 };
 #[cfg(feature = "publish")]
 pub(crate) use encode::{

@@ -146,7 +146,7 @@ pub(crate) struct Options {
     #[arg(long, value_name = "N")]
     pub(crate) rays_still: Option<u32>,
     /// Most bits of updates in any second, as in 500k or 2M: what is out of view, far away or nearly right waits or is less
-    /// exact [default: as many as it takes].
+    /// exact. Not of psao-paper and sas-B [default: as many as it takes].
     #[arg(long, value_name = "BITS/S")]
     pub(crate) budget: Option<BitRate>,
     /// Points, updates a second and budget that fit a device, where they are not given.

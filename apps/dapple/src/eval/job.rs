@@ -364,26 +364,22 @@ impl Line {
         let moving = |f: &FrameRow| FrameError::new(f.moving_psnr_db, f.moving_pixels as f64);
         let moving: Vec<FrameError> = self.frames.iter().map(moving).collect();
         let picture: Vec<FrameError> = self.frames.iter().map(|f| FrameError::new(f.psnr_db, 1.0)).collect();
+        // Absent for a method without points.
+        let points_per_m2 = pair.and_then(|p| p.points_per_m2);
+        let of_points = points_per_m2.map(|_| settings);
         let params = Params {
-            points_per_m2: pair.and_then(|p| p.points_per_m2),
+            points_per_m2,
             hz: pair.map(|p| p.hz),
             point_rays: pair.map(|_| settings.point_rays),
-            threshold: pair.and_then(|p| p.points_per_m2).map(|_| settings.threshold),
-            adaptive: pair
-                .and_then(|p| p.points_per_m2)
-                .map(|_| settings.adaptive)
-                .filter(|adaptive| *adaptive > 0.0),
-            ray_budget: pair.and_then(|p| p.points_per_m2).and(settings.step.ray_budget),
-            rays_still: pair
-                .and_then(|p| p.points_per_m2)
-                .map(|_| settings.step.rays_still)
-                .filter(|rays| *rays > 0),
-            budget_kbit_per_s: pair
+            threshold: of_points.map(|s| s.threshold),
+            adaptive: of_points.map(|s| s.adaptive).filter(|adaptive| *adaptive > 0.0),
+            ray_budget: of_points.and_then(|s| s.step.ray_budget),
+            rays_still: of_points.map(|s| s.step.rays_still).filter(|rays| *rays > 0),
+            budget_kbit_per_s: of_points
                 .filter(|_| !self.method.is_paper())
-                .and_then(|p| p.points_per_m2)
-                .and(settings.step.budget)
+                .and_then(|s| s.step.budget)
                 .map(|budget| budget.0 as f64 / 1e3),
-            max_points: pair.and_then(|p| p.points_per_m2).and(settings.step.max_points),
+            max_points: of_points.and_then(|s| s.step.max_points),
             rays_per_pixel: match self.method {
                 Method::Rtao { rays } => Some(rays),
                 _ => None,

@@ -74,7 +74,8 @@ impl PointLayout {
         Ok(PointLayout::joined(self.quantum_m(), self.spacing_m(), sets))
     }
 
-    fn has_lengths_of(&self, other: &PointLayout) -> bool {
+    /// Whether quantum and spacing are the same to the bit, so that sets of both can stand in one layout.
+    pub fn has_lengths_of(&self, other: &PointLayout) -> bool {
         let lengths = |layout: &PointLayout| [layout.quantum_m(), layout.spacing_m()].map(f32::to_bits);
         lengths(self) == lengths(other)
     }

@@ -130,8 +130,7 @@ fn check_fit(
 ) -> Result<(), DecodeError> {
     let bad = |reason| Err(DecodeError::Malformed { part: "sets that come", reason });
     let added = &decoded.layout;
-    let lengths = |layout: &PointLayout| [layout.quantum_m(), layout.spacing_m()].map(f32::to_bits);
-    if lengths(added) != lengths(held) || decoded.local_bits != local_bits {
+    if !added.has_lengths_of(held) || decoded.local_bits != local_bits {
         return bad("have other lengths than the layout");
     }
     if added.sets().is_empty() {

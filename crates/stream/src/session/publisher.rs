@@ -274,12 +274,16 @@ impl State {
                 self.encode(epoch, values, Tolerances::Each(&tolerances), step)
             };
             let bytes = found.as_ref().map_or(0, |delta| delta.payload.len());
-            self.pressure = pressure;
-            if let Some(delta) = found
-                && bytes <= most
-                && best.as_ref().is_none_or(|best| best.payload.len() < bytes)
-            {
-                best = Some(Delta { pressure, ..delta });
+            match found {
+                Some(delta)
+                    if bytes <= most && best.as_ref().is_none_or(|best| best.payload.len() < bytes) =>
+                {
+                    best = Some(Delta { pressure, ..delta });
+                }
+                // Nothing is too far off.
+                None if pressure.is_none() => self.pressure = pressure,
+                // What does not fit says nothing of what the next one takes.
+                _ => {}
             }
             match search.next(bytes, most) {
                 Some(further) => search = further,

@@ -1,6 +1,6 @@
 //! What both ends of a session ask of layouts whose sets come and go.
 
-use dapple_store::charts::Cuts;
+use dapple_store::charts::{Cuts, SetCuts};
 use dapple_store::points::{PointStore, SetsChange};
 
 use crate::codec::ValueChange;
@@ -9,10 +9,6 @@ use crate::codec::ValueChange;
 /// differ goes and comes.
 pub(super) fn difference(old: (&PointStore, &Cuts), new: (&PointStore, &Cuts)) -> Option<SetsChange> {
     let mut change = old.0.layout().difference(new.0.layout())?;
-    let cuts_of = |cuts: &'_ Cuts, instance| {
-        let sets = cuts.sets();
-        sets.binary_search_by_key(&instance, |set| set.instance).ok().map(|at| sets[at].clone())
-    };
     let mut stays = false;
     for set in new.0.layout().sets() {
         let instance = set.instance;
@@ -29,6 +25,11 @@ pub(super) fn difference(old: (&PointStore, &Cuts), new: (&PointStore, &Cuts)) -
     change.removed.sort_unstable();
     change.added.sort_unstable();
     (stays || change.is_empty()).then_some(change)
+}
+
+fn cuts_of(cuts: &Cuts, instance: u32) -> Option<&SetCuts> {
+    let sets = cuts.sets();
+    sets.binary_search_by_key(&instance, |set| set.instance).ok().map(|at| &sets[at])
 }
 
 /// The points of sets that stayed, all but those of the instances `added`, whose values differ; by their index in `new`.

@@ -6,8 +6,9 @@ use dapple_store::charts::Cuts;
 use dapple_store::points::{Change, PointLayout, PointStore, StoreError};
 
 use crate::codec::{
-    DecodeError, DecodedLayout, DecodedSets, FrameHeader, FrameKind, Limits, Near, Scratch, ValueChange,
-    decode_changes, decode_layout, decode_sets_change, decode_values, open, parse_delta, parse_snapshot,
+    DecodeError, DecodedLayout, DecodedSets, DeltaParts, FrameHeader, FrameKind, Limits, Near, Scratch,
+    ValueChange, decode_changes, decode_layout, decode_sets_change, decode_values, open, parse_delta,
+    parse_snapshot,
 };
 use crate::session::sets::{difference, value_changes};
 
@@ -194,12 +195,9 @@ impl Subscriber {
             && state.layout_bytes == parts.layout
         {
             let values = decode_values(parts.values, state.store.layout(), &state.near)?;
-            let changes: Vec<ValueChange> = (0u32..)
-                .zip(state.store.visibility().iter().zip(&values))
-                .filter(|(_, (old, new))| old != new)
-                .map(|(point, (&old, &new))| ValueChange { point, old, new })
-                .collect();
-            state.store = new_store(state.store.layout().clone(), values)?;
+            let store = new_store(state.store.layout().clone(), values)?;
+            let changes = value_changes(&state.store, &store, &[]);
+            state.store = store;
             (state.group, state.epoch) = (header.group, header.epoch);
             return Ok(Applied::Changes(changes));
         }
@@ -236,40 +234,42 @@ impl Subscriber {
     }
 
     fn receive_delta(&mut self, header: &FrameHeader, payload: &[u8]) -> Result<Applied, ReceiveError> {
-        let parts = parse_delta(header.epoch, payload)?;
-        let need =
-            |held| ReceiveError::NeedSnapshot { group: header.group, base_epoch: parts.base_epoch, held };
-        let state = self.state.as_mut().ok_or(need(None))?;
-        if (state.group, state.epoch) != (header.group, parts.base_epoch) {
-            return Err(need(Some((state.group, state.epoch))));
-        }
+        let (parts, state) = self.base(header, payload)?;
         let State { store, near, scratch, .. } = state;
         let changes = decode_changes(&parts, store.layout(), near, store.visibility(), scratch)?;
-        let news: Vec<Change> =
-            changes.iter().map(|c| Change { point: c.point, visibility: c.new }).collect();
-        state.store.apply(&news).map_err(misfit)?;
+        apply(store, &changes)?;
         state.epoch = header.epoch;
         Ok(Applied::Changes(changes))
     }
 
-    fn receive_sets(&mut self, header: &FrameHeader, payload: &[u8]) -> Result<Applied, ReceiveError> {
+    /// What builds on an epoch of this group, and the state at that very epoch.
+    fn base<'a>(
+        &mut self,
+        header: &FrameHeader,
+        payload: &'a [u8],
+    ) -> Result<(DeltaParts<'a>, &mut State), ReceiveError> {
         let parts = parse_delta(header.epoch, payload)?;
-        let need =
-            |held| ReceiveError::NeedSnapshot { group: header.group, base_epoch: parts.base_epoch, held };
-        let state = self.state.as_mut().ok_or(need(None))?;
-        if (state.group, state.epoch) != (header.group, parts.base_epoch) {
-            return Err(need(Some((state.group, state.epoch))));
+        let held = self.state.as_ref().map(|state| (state.group, state.epoch));
+        match &mut self.state {
+            Some(state) if held == Some((header.group, parts.base_epoch)) => Ok((parts, state)),
+            _ => {
+                let (group, base_epoch) = (header.group, parts.base_epoch);
+                Err(ReceiveError::NeedSnapshot { group, base_epoch, held })
+            }
         }
+    }
+
+    fn receive_sets(&mut self, header: &FrameHeader, payload: &[u8]) -> Result<Applied, ReceiveError> {
+        let limits = self.limits;
+        let (parts, state) = self.base(header, payload)?;
         let held = (&**state.store.layout(), &state.cuts, state.local_bits);
-        let DecodedSets { gone, added, cuts, changes } = decode_sets_change(&parts, held, &self.limits)?;
+        let DecodedSets { gone, added, cuts, changes } = decode_sets_change(&parts, held, &limits)?;
         let mut store = state.store.with_sets(&gone, &added).map_err(DecodeError::from)?;
         let mut near = Near::new(store.layout(), state.local_bits);
         if let Some(parts) = &changes {
             let scratch = &mut state.scratch;
             let changes = decode_changes(parts, store.layout(), &mut near, store.visibility(), scratch)?;
-            let news: Vec<Change> =
-                changes.iter().map(|c| Change { point: c.point, visibility: c.new }).collect();
-            store.apply(&news).map_err(misfit)?;
+            apply(&mut store, &changes)?;
         }
         let added: Vec<u32> = added.layout().sets().iter().map(|set| set.instance).collect();
         let changes = value_changes(&state.store, &store, &added);
@@ -278,6 +278,11 @@ impl Subscriber {
         (state.store, state.near, state.epoch) = (store, near, header.epoch);
         Ok(Applied::Sets { removed: gone, added, changes })
     }
+}
+
+fn apply(store: &mut PointStore, changes: &[ValueChange]) -> Result<(), DecodeError> {
+    let news: Vec<Change> = changes.iter().map(|c| Change { point: c.point, visibility: c.new }).collect();
+    store.apply(&news).map_err(misfit)
 }
 
 fn new_store(layout: Arc<PointLayout>, values: Vec<u8>) -> Result<PointStore, DecodeError> {

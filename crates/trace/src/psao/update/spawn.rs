@@ -77,11 +77,10 @@ impl Updater {
         if let Some(set) = layout.sets().iter().find(|set| waits(set.instance)) {
             return Err(LayoutError::SetExists(set.instance));
         }
-        let lengths = |layout: &PointLayout| [layout.quantum_m(), layout.spacing_m()].map(f32::to_bits);
-        if lengths(&layout) != lengths(self.store.layout()) {
+        let held = self.store.layout();
+        if !layout.has_lengths_of(held) {
             return Err(LayoutError::OtherLengths);
         }
-        let held = self.store.layout();
         if let Some(set) = layout.sets().iter().find(|set| held.set_of_instance(set.instance).is_some()) {
             return Err(LayoutError::SetExists(set.instance));
         }
