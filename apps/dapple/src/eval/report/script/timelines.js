@@ -306,8 +306,11 @@ function drawSettling(add, caseIndex, shown) {
       const { settling } = found.rows[index];
       return { rows: [index], times: settling.after_s.map((s) => s * 1000), values: values(settling) };
     });
+  const stayed = timeState.settling === "behind" && lines.every((line) => line.values.every((value) => value === 0));
   if (!lines.length) {
     add(title, "None of the rows shown was looked at after a move.", true);
+  } else if (stayed) {
+    add(title, "The move changed nothing in view.", true);
   } else {
     const draw = (inside) => linePlot(inside, caseIndex, lines, { ...format, xUnit: "ms", xDigits: 0, tall: true });
     add(title, draw, true);
