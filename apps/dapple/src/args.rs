@@ -3,6 +3,7 @@
 pub(crate) mod bake;
 mod bit_rate;
 mod eval;
+mod serve;
 mod verbs;
 mod view;
 mod watch;
@@ -16,6 +17,7 @@ use dapple_scene::glam::Vec3;
 pub(crate) use bake::BakeArgs;
 pub(crate) use bit_rate::BitRate;
 pub(crate) use eval::{EvalArgs, Options, ScenesArgs};
+pub(crate) use serve::{LogFormat, Named, ServeArgs};
 pub(crate) use verbs::{CompareArgs, DiffArgs, ErrorMap, EvalVerb, JudgeArgs, PictureFormat, ReferenceArgs};
 pub(crate) use view::{Preset, ViewArgs, ViewKind};
 pub(crate) use watch::{DemoArgs, InspectArgs, LightArgs, RecordArgs};
@@ -57,6 +59,9 @@ pub(crate) enum Command {
     /// Serve a built-in scene and its light to browsers on this machine.
     #[command(after_help = watch::DEMO_EXAMPLES)]
     Demo(DemoArgs),
+    /// Light a scene for any number of viewers, live: browsers and `dapple view --url`.
+    #[command(after_help = serve::SERVE_EXAMPLES)]
+    Serve(Box<ServeArgs>),
 }
 
 const RENDER_EXAMPLES: &str = "\

@@ -115,7 +115,7 @@ pub(crate) fn watch_interrupts() {
 
 /// Waits for a signal to end; gives its number.
 #[cfg(unix)]
-async fn wait_for_interrupt() -> std::io::Result<i32> {
+pub(crate) async fn wait_for_interrupt() -> std::io::Result<i32> {
     use std::task::Poll;
     use tokio::signal::unix::{SignalKind, signal};
 
@@ -129,7 +129,7 @@ async fn wait_for_interrupt() -> std::io::Result<i32> {
 }
 
 #[cfg(not(unix))]
-async fn wait_for_interrupt() -> std::io::Result<i32> {
+pub(crate) async fn wait_for_interrupt() -> std::io::Result<i32> {
     const SIGINT: i32 = 2;
     tokio::signal::ctrl_c().await.map(|()| SIGINT)
 }

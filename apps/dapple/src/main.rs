@@ -12,13 +12,16 @@ mod file;
 mod inspect;
 mod judge;
 mod light;
+mod listen;
 mod page;
 mod picture;
 mod progress;
 mod record;
 mod render;
 mod scene_command;
+mod serve;
 mod source;
+mod transport;
 mod view;
 
 use std::io::IsTerminal;
@@ -26,25 +29,32 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use args::{Cli, Command};
+use args::{Cli, Command, LogFormat};
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let filter = tracing_subscriber::EnvFilter::try_from_env("DAPPLE_LOG")
-        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new("warn"));
-    tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_target(false)
-        .with_ansi(std::io::stderr().is_terminal())
-        .without_time()
-        .with_writer(std::io::stderr)
-        .init();
+    log(&cli.command);
     match run(cli) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");
             ExitCode::FAILURE
         }
+    }
+}
+
+/// Lines of the log go to standard error; `DAPPLE_LOG` says which.
+fn log(command: &Command) {
+    let (level, format) = match command {
+        Command::Serve(args) => ("info", args.log_format),
+        _ => ("warn", LogFormat::Text),
+    };
+    let filter = tracing_subscriber::EnvFilter::try_from_env("DAPPLE_LOG")
+        .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(level));
+    let lines = tracing_subscriber::fmt().with_env_filter(filter).with_target(false).with_writer(std::io::stderr);
+    match format {
+        LogFormat::Json => lines.json().init(),
+        LogFormat::Text => lines.with_ansi(std::io::stderr().is_terminal()).without_time().init(),
     }
 }
 
@@ -68,6 +78,8 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Quality(args) => args.threads,
         Command::Bake(args) => args.threads,
         Command::Scene(_) | Command::Inspect(_) | Command::Demo(_) | Command::View(_) => 0,
+        // Its light has threads of its own.
+        Command::Serve(args) => return serve::run(args),
     };
     if threads > 1024 {
         anyhow::bail!("--threads is {threads}, must be 0 (one for each core) to 1024");
@@ -83,5 +95,6 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Inspect(args) => inspect::run(&args),
         Command::Demo(args) => demo::run(&args),
         Command::View(args) => view::run(&args),
+        Command::Serve(args) => serve::run(&args),
     })
 }

@@ -1,5 +1,7 @@
 //! `viewer.json`: what lies in a folder that a page, or `dapple view --url`, shows.
 
+use std::path::{Path, PathBuf};
+
 use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
 
@@ -7,13 +9,31 @@ use serde::{Deserialize, Serialize};
 pub(crate) const FILE_NAME: &str = "viewer.json";
 
 /// What to show. The page knows more settings; those are left to it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ViewerJson {
     /// Address of a self-contained scene, relative to the folder.
     pub(crate) scene: String,
     /// Address of its recorded stream.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) stream: Option<String>,
+    /// Address of a live session of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) live: Option<String>,
+    /// The animation that plays, if that is not the file's first.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) animation: Option<u32>,
+    /// Spare instances that the scene gets when it is loaded.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) spares: Vec<Spares>,
+}
+
+/// So many spare instances like one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Spares {
+    /// The instance.
+    pub(crate) instance: u32,
+    /// How many.
+    pub(crate) count: u32,
 }
 
 impl ViewerJson {
@@ -22,6 +42,26 @@ impl ViewerJson {
             r#"viewer.json must name a scene and a stream: {"scene": "FILE.glb", "stream": "FILE.dapple"}"#,
         )
     }
+}
+
+/// The folder of the built page.
+pub(crate) fn built_page(given: Option<&Path>) -> Result<PathBuf> {
+    let built = |folder: &Path| folder.join("index.html").is_file();
+    let advice = "build it with `cargo xtask wasm`, which writes target/web, or name its folder with --page";
+    if let Some(folder) = given {
+        if !built(folder) {
+            bail!("there is no page in {}: {advice}", folder.display());
+        }
+        return Ok(folder.to_owned());
+    }
+    let here = PathBuf::from("target/web");
+    // Beside this program's own build folder.
+    let beside = std::env::current_exe().ok().and_then(|exe| Some(exe.parent()?.parent()?.join("web")));
+    [Some(here), beside]
+        .into_iter()
+        .flatten()
+        .find(|folder| built(folder))
+        .with_context(|| format!("there is no page in target/web: {advice}"))
 }
 
 /// The address of something in the folder at `base`, or elsewhere on its host.
@@ -85,7 +125,7 @@ mod tests {
     #[test]
     fn other_settings_are_left_to_the_page() {
         let json = br#"{"scene": "a.glb", "stream": "a.dapple", "method": "none", "paused": true}"#;
-        let expected = ViewerJson { scene: "a.glb".into(), stream: Some("a.dapple".into()) };
+        let expected = ViewerJson { scene: "a.glb".into(), stream: Some("a.dapple".into()), ..ViewerJson::default() };
         assert_eq!(ViewerJson::parse(json).unwrap(), expected);
         assert_eq!(ViewerJson::parse(&serde_json::to_vec(&expected).unwrap()).unwrap(), expected);
         assert!(ViewerJson::parse(br#"{"stream": "a.dapple"}"#).is_err());

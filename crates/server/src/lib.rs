@@ -6,13 +6,14 @@
 
 pub mod paper;
 mod population;
+mod streams;
 
 use std::sync::Arc;
 
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Pose, Scene};
 use dapple_store::points::{LayoutError, PointStore};
-use dapple_stream::{Budget, Frame, FrameKind, Precision, Publisher, PublisherConfig, Spending};
+use dapple_stream::{Budget, Frame, Precision, Publisher, PublisherConfig};
 use dapple_trace::Tracer;
 use dapple_trace::psao::cuts::find_cuts;
 use dapple_trace::psao::generate::{
@@ -22,6 +23,7 @@ use dapple_trace::psao::paper::PaperError;
 use dapple_trace::psao::update::{StepCounts, StepInput, UpdateError, UpdateParams, Updater};
 
 use population::Population;
+use streams::Stream;
 
 /// Settings of a server. Each group documents its own ranges and defaults.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -149,8 +151,8 @@ pub struct Server {
     scene: Arc<Scene>,
     tracer: Tracer,
     updater: Updater,
-    publisher: Publisher,
-    budget: Option<Budget>,
+    /// What [`Server::step_at`] publishes, and what was added to it.
+    streams: Vec<Stream>,
     tolerance: u8,
     dropped_inside: u32,
     /// Who has points, where there is a cap on them.
@@ -213,9 +215,9 @@ impl Server {
             publisher.set_cuts(layout.clone(), cuts);
         }
         publisher.publish(updater.store());
-        let budget = config.bits_per_s.map(Budget::new);
+        let streams = vec![Stream { publisher, budget: config.bits_per_s.map(Budget::new) }];
         let tolerance = config.publish.precision.tolerance;
-        Ok(Server { scene, tracer, updater, publisher, budget, tolerance, dropped_inside, population: None })
+        Ok(Server { scene, tracer, updater, streams, tolerance, dropped_inside, population: None })
     }
 
     /// Brings the scene to `now_s` (seconds) and publishes what changed. Time may run in any direction. Takes as many rays
@@ -248,28 +250,19 @@ impl Server {
         if let Some(population) = &mut self.population {
             spawned = self.updater.take_ready();
             if !spawned.is_empty() {
-                self.publisher
-                    .set_cuts(self.updater.store().layout().clone(), population.take_cuts(&spawned));
+                let cuts = population.take_cuts(&spawned);
+                for stream in &mut self.streams {
+                    stream.publisher.set_cuts(self.updater.store().layout().clone(), cuts.clone());
+                }
             }
         }
-        let frame = match &mut self.budget {
-            None => self.publisher.publish(self.updater.store()),
-            Some(budget) => {
-                let coarseness = self.updater.coarseness(input.interest, Spending::STRETCH);
-                let most_bytes = Some(budget.allowance(sent_s));
-                let spending = Spending { most_bytes, coarseness: &coarseness };
-                let frame = self.publisher.publish_within(self.updater.store(), &spending);
-                let sent = frame.as_ref().filter(|frame| frame.kind == FrameKind::Delta);
-                budget.spend(sent.map_or(0, |frame| frame.bytes.len()));
-                frame
-            }
-        };
+        let frame = self.publish_stream(0, sent_s, input.interest);
         Ok(StepReport {
             frame,
             traced: report.counts.traced(),
             rays: report.counts.rays(),
             counts: report.counts,
-            changed: self.publisher.changed(),
+            changed: self.streams[0].publisher.changed(),
             held_back: self.held_back(),
             points: (self.updater.store().layout().len() + self.updater.spawning()) as u32,
             spawned: spawned.len() as u32,
@@ -277,17 +270,9 @@ impl Server {
         })
     }
 
-    /// From now on deltas take at most so many bits in any second; `None`: as many as they need.
-    pub fn set_bits_per_s(&mut self, bits_per_s: Option<u64>) {
-        self.budget = bits_per_s.map(|bits| match self.budget.take() {
-            Some(budget) => budget.with_bits_per_s(bits),
-            None => Budget::new(bits),
-        });
-    }
-
     /// Points that a budget of bits did not reach.
     fn held_back(&self) -> u32 {
-        if self.budget.is_none() {
+        if self.streams[0].budget.is_none() {
             return 0;
         }
         let pairs = self.store().visibility().iter().zip(self.traced().visibility());
@@ -296,17 +281,17 @@ impl Server {
 
     /// The snapshot that brings a subscriber that joins now up to date. Encoded at most once an update.
     pub fn join(&mut self) -> Result<Option<Frame>, ServerError> {
-        Ok(self.publisher.join())
+        Ok(self.join_stream(0))
     }
 
     /// How many bytes of a snapshot are cuts.
     pub fn cut_bytes(&self) -> usize {
-        self.publisher.cut_bytes()
+        self.streams[0].publisher.cut_bytes()
     }
 
     /// What has been published: what every subscriber that is up to date holds, to the bit.
     pub fn store(&self) -> &PointStore {
-        self.publisher.store().expect("a server publishes as it starts")
+        self.streams[0].publisher.store().expect("a server publishes as it starts")
     }
 
     /// What was traced: what has been published is nowhere farther from it than the publisher's tolerance, but for
@@ -338,6 +323,7 @@ impl Server {
     /// Bytes held now for each point, tracer and scene not counted ([`Updater::bytes_per_point`], [`Publisher::bytes`]).
     pub fn bytes_per_point(&self) -> f64 {
         let points = self.store().layout().len().max(1) as f64;
-        self.updater.bytes_per_point() + self.publisher.bytes() as f64 / points
+        let published: usize = self.streams.iter().map(|stream| stream.publisher.bytes()).sum();
+        self.updater.bytes_per_point() + published as f64 / points
     }
 }

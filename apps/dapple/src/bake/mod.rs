@@ -29,7 +29,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail};
 use dapple_trace::rtao::{MAX_RAYS, RtaoParams};
 
-use crate::args::{BakeArgs, Radius};
+use crate::args::{BakeArgs, Radius, SceneChoice};
 use crate::file::{check_writable, write_file, write_parts};
 use crate::progress::Bar;
 use crate::source;
@@ -50,6 +50,12 @@ enum Format {
     Gltf,
     Ply,
     Dapple,
+}
+
+/// A scene with everything that it refers to as one GLB.
+pub(crate) fn pack(choice: &SceneChoice) -> Result<Vec<u8>> {
+    let input = input::load(choice)?;
+    Ok(input.document.to_glb(&input.title)?.concat())
 }
 
 /// Bakes what the arguments ask for and writes it.

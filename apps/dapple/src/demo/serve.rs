@@ -1,6 +1,5 @@
 //! A folder over HTTP on this machine.
 
-use std::io::ErrorKind;
 use std::net::TcpListener;
 use std::path::Path;
 use std::time::Duration;
@@ -16,33 +15,10 @@ use tower_http::compression::predicate::{DefaultPredicate, NotForContentType, Pr
 use tower_http::services::ServeDir;
 use tower_http::set_header::SetResponseHeaderLayer;
 
-/// The port that is tried first where none is given, and how many after it.
-const FIRST_PORT: u16 = 8000;
-const PORTS_TRIED: u16 = 100;
+use crate::listen::url_of;
 
 /// How long requests under way may take once the program is told to stop.
 const PATIENCE: Duration = Duration::from_millis(500);
-
-/// The given port of `host`, or else the first that is free.
-pub(super) fn bind(host: &str, port: Option<u16>) -> Result<TcpListener> {
-    let try_port = |port: u16| TcpListener::bind((host, port));
-    if let Some(port) = port {
-        return try_port(port).map_err(|error| match error.kind() {
-            ErrorKind::AddrInUse => anyhow::anyhow!(
-                "port {port} is in use: choose another with --port, or leave it out to take a free one"
-            ),
-            _ => anyhow::Error::new(error).context(format!("cannot listen on {host}, port {port}")),
-        });
-    }
-    for port in FIRST_PORT..FIRST_PORT + PORTS_TRIED {
-        match try_port(port) {
-            Ok(listener) => return Ok(listener),
-            Err(error) if matches!(error.kind(), ErrorKind::AddrInUse | ErrorKind::PermissionDenied) => {}
-            Err(error) => return Err(error).with_context(|| format!("cannot listen on {host}, port {port}")),
-        }
-    }
-    bail!("ports {FIRST_PORT} to {} are all in use: choose another with --port", FIRST_PORT + PORTS_TRIED - 1)
-}
 
 /// Serves `folder` until Ctrl-C, or, with `only_check`, until it has fetched its own page once.
 pub(super) fn serve(listener: TcpListener, folder: &Path, only_check: bool) -> Result<()> {
@@ -60,11 +36,7 @@ pub(super) fn serve(listener: TcpListener, folder: &Path, only_check: bool) -> R
     };
     let server = runtime.spawn(async move { axum::serve(listener, router).await });
 
-    // Who listens on all addresses is reached on this machine by the usual one.
-    let shown_ip =
-        if address.ip().is_unspecified() { "127.0.0.1".to_owned() } else { address.ip().to_string() };
-    let host = if shown_ip.contains(':') { format!("[{shown_ip}]") } else { shown_ip };
-    let url = format!("http://{host}:{}/", address.port());
+    let url = url_of(address, "http");
     if only_check {
         check(&url)?;
         say!("CI is set: {url} answers; it is not served on");

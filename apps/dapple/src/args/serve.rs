@@ -1,0 +1,155 @@
+//! Arguments of `dapple serve`.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args, ValueEnum};
+use dapple_session::Role;
+
+use super::{BitRate, LightArgs, SceneChoice};
+
+pub(crate) const SERVE_EXAMPLES: &str = "\
+Examples:
+  dapple serve room.glb                          light a scene for everyone on this machine: prints the addresses
+  dapple serve --builtin atrium --detail 0.5 --points 512
+  dapple serve room.glb --host 0.0.0.0 --token interact=SECRET       others in the network look; with ?token=SECRET they move things
+  dapple serve room.glb --host 0.0.0.0 --tls-cert cert.pem --tls-key key.pem
+  dapple serve --builtin atrium --spare boulder-0=8 --record session.dapple
+
+Ctrl-C or SIGTERM ends it in order. docs/deploy.md tells of more than one machine, docs/live.md specifies the messages.";
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ServeArgs {
+    #[command(flatten)]
+    pub(crate) scene: SceneChoice,
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
+    /// Part of the time between two updates that a step may take: rays are rationed by how long they took before. Above 0 to 1;
+    /// --ray-budget sets a fixed number instead.
+    #[arg(long, value_name = "PART", default_value_t = 0.7)]
+    pub(crate) load: f64,
+    /// Leaner streams beside the full one, for viewers that ask for fewer bits (?bits=500k): most bits in any second of each.
+    #[arg(long, value_name = "BITS/S,…", value_delimiter = ',', default_value = "500k,2M")]
+    pub(crate) rungs: Vec<BitRate>,
+    /// Begin with scene time standing still.
+    #[arg(long)]
+    pub(crate) paused: bool,
+    /// Spare instances of an object, by the name of its node or of its mesh, which viewers may add to the scene.
+    #[arg(long, value_name = "NAME=N")]
+    pub(crate) spare: Vec<Named<u32>>,
+    /// Keep what is sent in a recording.
+    #[arg(long, value_name = "FILE.dapple")]
+    pub(crate) record: Option<PathBuf>,
+    /// A secret and what it allows: view=SECRET or interact=SECRET. Without any, everyone may do everything; with one for interact alone, the
+    /// others may look.
+    #[arg(long, value_name = "ROLE=SECRET", env = "DAPPLE_TOKENS", value_delimiter = ' ', hide_env_values = true)]
+    pub(crate) token: Vec<Token>,
+    /// Most viewers at a time.
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    pub(crate) max_viewers: u32,
+    /// Most events a second of one viewer.
+    #[arg(long, value_name = "N", default_value_t = 60)]
+    pub(crate) max_events: u32,
+    /// Address to listen on; 0.0.0.0 lets others in the network in.
+    #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1", env = "DAPPLE_HOST")]
+    pub(crate) host: String,
+    /// Port to listen on; 0 takes any [default: 8000, or the next that is free].
+    #[arg(long, value_name = "PORT", env = "DAPPLE_PORT")]
+    pub(crate) port: Option<u16>,
+    /// Certificates in PEM for https and wss, the server's own first.
+    #[arg(long, value_name = "FILE.pem", requires = "tls_key")]
+    pub(crate) tls_cert: Option<PathBuf>,
+    /// Their key in PEM.
+    #[arg(long, value_name = "FILE.pem", requires = "tls_cert")]
+    pub(crate) tls_key: Option<PathBuf>,
+    /// Folder of the built page [default: target/web].
+    #[arg(long, value_name = "DIR")]
+    pub(crate) page: Option<PathBuf>,
+    /// How lines of the log look.
+    #[arg(long, value_enum, default_value = "text")]
+    pub(crate) log_format: LogFormat,
+    /// Threads that trace; 0 is one for each core.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) threads: usize,
+}
+
+/// How lines of the log look.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LogFormat {
+    /// For people.
+    Text,
+    /// An object a line.
+    Json,
+}
+
+/// A secret and what it allows.
+#[derive(Clone, PartialEq, Eq)]
+pub(crate) struct Token {
+    pub(crate) role: Role,
+    pub(crate) secret: String,
+}
+
+impl std::fmt::Debug for Token {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:?}=…", self.role)
+    }
+}
+
+impl FromStr for Token {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let usage = "write view=SECRET or interact=SECRET";
+        let (role, secret) = text.split_once('=').ok_or(usage)?;
+        let role = match role {
+            "view" => Role::View,
+            "interact" => Role::Interact,
+            _ => return Err(format!("there is no role {role}: {usage}")),
+        };
+        if secret.is_empty() || secret.len() > 256 {
+            return Err("a secret has 1 to 256 bytes".to_owned());
+        }
+        Ok(Token { role, secret: secret.to_owned() })
+    }
+}
+
+/// NAME=VALUE.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Named<T> {
+    pub(crate) name: String,
+    pub(crate) value: T,
+}
+
+impl<T: FromStr> FromStr for Named<T> {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let usage = || format!("{text}: write NAME=N");
+        let (name, value) = text.rsplit_once('=').ok_or_else(usage)?;
+        let value = value.parse().map_err(|_| usage())?;
+        Ok(Named { name: name.to_owned(), value })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tokens_name_a_role() {
+        let token: Token = "interact=a=b".parse().unwrap();
+        assert_eq!((token.role, token.secret.as_str()), (Role::Interact, "a=b"));
+        assert!(!format!("{token:?}").contains("a=b"));
+        for bad in ["", "view", "view=", "root=x", "=x"] {
+            assert!(bad.parse::<Token>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn spares_name_an_object() {
+        let spare: Named<u32> = "a=b=3".parse().unwrap();
+        assert_eq!((spare.name.as_str(), spare.value), ("a=b", 3));
+        assert!("a".parse::<Named<u32>>().is_err());
+        assert!("a=-1".parse::<Named<u32>>().is_err());
+    }
+}

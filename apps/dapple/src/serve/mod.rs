@@ -1,0 +1,248 @@
+//! `dapple serve`: a scene, lit for any number of viewers.
+//!
+//! ```text
+//! engine (a thread): step ─► host ◄─► viewer tasks ◄─ transport ─► viewers
+//!                                    web: page, scene, health, metrics
+//! ```
+
+mod accept;
+mod asset;
+mod engine;
+mod figures;
+mod hub;
+mod ration;
+mod recording;
+mod viewer;
+mod web;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, anyhow, bail};
+use dapple_server::ServerConfig;
+use dapple_session::Role;
+use dapple_session::host::{Access, Host, HostConfig};
+use dapple_stream::PublisherConfig;
+use tokio::runtime::Runtime;
+use tokio::sync::watch;
+
+use crate::args::{LightArgs, ServeArgs};
+use crate::file::{check_writable, wait_for_interrupt};
+use crate::light::server_config;
+use crate::listen::{bind, url_of};
+use crate::page::built_page;
+use crate::progress::Bar;
+use asset::Asset;
+use engine::Engine;
+use hub::{Hub, Phase};
+use ration::Ration;
+use recording::LiveRecording;
+
+/// Updates a second where none are given.
+const DEFAULT_HZ: f64 = 30.0;
+
+/// How long viewers have to go once the program is told to stop.
+const DRAIN: Duration = Duration::from_secs(5);
+
+/// Connections beside those of viewers: for pages, scenes and figures.
+const OTHER_CONNECTIONS: usize = 256;
+
+/// Serves until told to stop.
+pub(crate) fn run(args: &ServeArgs) -> Result<()> {
+    let began = Instant::now();
+    check(args)?;
+    let tls = match (&args.tls_cert, &args.tls_key) {
+        (Some(certificates), Some(key)) => Some(accept::tls(certificates, key)?),
+        _ => None,
+    };
+    let socket = bind(&args.host, args.port)?;
+    let page = match &args.page {
+        Some(_) => Some(built_page(args.page.as_deref())?),
+        None => built_page(None).ok(),
+    };
+    let asset = Arc::new(load(args)?);
+    let light = LightArgs { hz: Some(args.light.hz.unwrap_or(DEFAULT_HZ)), ..args.light.clone() };
+    let hz = light.hz();
+    let mut config = server_config(&asset.scene, &light)?;
+    // Groups of an earlier run of this server must not be taken for this one's.
+    let since_1970 = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    let first_group = since_1970.map_or(0, |since| since.as_millis() as u64);
+    config.publish = PublisherConfig { first_group, ..config.publish };
+    config.check(&asset.scene)?;
+    let recording = match &args.record {
+        Some(path) => Some(LiveRecording::create(path, asset.scene.hash().0, &asset.scene.name)?),
+        None => None,
+    };
+    let tokens = args.token.iter().map(|token| (token.secret.clone(), token.role)).collect();
+    let host_config = HostConfig {
+        hz,
+        max_viewers: args.max_viewers,
+        events_per_s: args.max_events,
+        access: Access::new(tokens),
+        rungs: rungs(config.bits_per_s, args),
+        playing: !args.paused,
+        ..HostConfig::default()
+    };
+    let scene = asset.scene.clone();
+    let access = host_config.access.clone();
+    let hub = Arc::new(Hub::new(|now_us| Host::new(scene, host_config, now_us), began));
+
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .context("cannot start the server's threads")?;
+    let address = socket.local_addr().context("the listener has no address")?;
+    let listener = {
+        let _guard = runtime.enter();
+        accept::listener(socket)?
+    };
+    let has_page = page.is_some();
+    let router = web::router(hub.clone(), asset.clone(), page);
+    let (stop_accepting, stop) = watch::channel(false);
+    let most = args.max_viewers as usize + OTHER_CONNECTIONS;
+    raise_file_limit(most as u64 + 64);
+    let is_secure = tls.is_some();
+    runtime.spawn(accept::accept(listener, router, tls, most, stop));
+
+    let stop_light = Arc::new(AtomicBool::new(false));
+    let step_s = args.load / hz;
+    let ration = Ration::new(step_s, light.step.ray_budget);
+    let engine = Engine { hub: hub.clone(), config, hz, ration, recording, stop: stop_light.clone() };
+    let engine = start(engine, args.threads)?;
+    let url = url_of(address, if is_secure { "https" } else { "http" });
+    announce(&url, &asset, has_page, is_secure);
+    if !address.ip().is_loopback() && access.open_role() == Some(Role::Interact) {
+        tracing::warn!("whoever reaches this address may change the scene: --token interact=SECRET keeps that to some");
+    }
+    let ended = wait(&runtime, &hub);
+
+    drain(&runtime, &hub, &stop_accepting);
+    stop_light.store(true, Ordering::Relaxed);
+    let light = engine.join().map_err(|_| anyhow!("the light ended in a panic"))?;
+    runtime.shutdown_timeout(Duration::from_millis(500));
+    light.and(ended)
+}
+
+fn check(args: &ServeArgs) -> Result<()> {
+    if !(args.load > 0.0 && args.load <= 1.0) {
+        bail!("--load is {}, must be above 0 to 1", args.load);
+    }
+    if !(1..=100_000).contains(&args.max_viewers) {
+        bail!("--max-viewers is {}, must be 1 to 100000", args.max_viewers);
+    }
+    if !(1..=10_000).contains(&args.max_events) {
+        bail!("--max-events is {}, must be 1 to 10000", args.max_events);
+    }
+    if args.rungs.len() > 8 {
+        bail!("--rungs names {} streams, at most 8 are made", args.rungs.len());
+    }
+    if args.threads > 1024 {
+        bail!("--threads is {}, must be 0 (one for each core) to 1024", args.threads);
+    }
+    if let Some(path) = &args.record {
+        if !path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("dapple")) {
+            bail!("--record {} would hold a recording: name it .dapple", path.display());
+        }
+        check_writable(path).context("--record")?;
+    }
+    Ok(())
+}
+
+fn load(args: &ServeArgs) -> Result<Asset> {
+    let _wheel = Bar::spinner("loading the scene");
+    Asset::load(&args.scene, &args.spare)
+}
+
+/// The full stream and leaner ones.
+fn rungs(full: Option<u64>, args: &ServeArgs) -> Vec<Option<u64>> {
+    let leaner = args.rungs.iter().map(|rate| rate.0).filter(|bits| full.is_none_or(|full| *bits < full));
+    std::iter::once(full).chain(leaner.map(Some)).collect()
+}
+
+/// Starts the light on threads of its own.
+fn start(engine: Engine, threads: usize) -> Result<JoinHandle<Result<()>>> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .context("cannot start the threads that trace")?;
+    std::thread::Builder::new()
+        .name("light".to_owned())
+        .spawn(move || pool.install(move || engine.run()))
+        .context("cannot start the thread that lights")
+}
+
+/// Says where what is to be found.
+fn announce(url: &str, asset: &Asset, has_page: bool, is_secure: bool) {
+    say!("\n{} is lit here:", asset.title);
+    if has_page {
+        say!("  in a browser   {url}");
+    } else {
+        say!("  in a browser   not yet: build the page with `cargo xtask wasm`, then start again");
+    }
+    if !is_secure {
+        say!("  in a window    dapple view --url {url}");
+    }
+    say!("  figures        {url}health  {url}metrics\nCtrl-C ends it\n");
+}
+
+/// Waits for a signal, or for the light to fail; meanwhile shows how the start goes on.
+fn wait(runtime: &Runtime, hub: &Hub) -> Result<()> {
+    let mut phases = hub.watch_phase();
+    runtime.block_on(async {
+        let mut bar = None;
+        let interrupt = wait_for_interrupt();
+        tokio::pin!(interrupt);
+        loop {
+            match &*phases.borrow_and_update() {
+                Phase::Starting(what, mille) => {
+                    let bar = bar.get_or_insert_with(|| Bar::new(what, 1000));
+                    bar.message(what);
+                    bar.set(u64::from(*mille));
+                }
+                Phase::Failed(reason) => bail!("{reason}"),
+                Phase::Serving | Phase::Draining => bar = None,
+            }
+            tokio::select! {
+                signal = &mut interrupt => {
+                    signal.context("cannot wait for signals")?;
+                    return Ok(());
+                }
+                changed = phases.changed() => changed.context("the light has ended")?,
+            }
+        }
+    })
+}
+
+/// Tells viewers that it ends, and gives them time to hear it.
+fn drain(runtime: &Runtime, hub: &Hub, stop_accepting: &watch::Sender<bool>) {
+    tracing::info!("ending");
+    hub.set_phase(Phase::Draining);
+    hub.host().close();
+    let until = Instant::now() + DRAIN;
+    runtime.block_on(async {
+        while hub.host().counts().viewers > 0 && Instant::now() < until {
+            hub.step_done();
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+        // The last goodbyes are on their way.
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    });
+    stop_accepting.send_replace(true);
+}
+
+/// Allows as many open files as there may be connections, as far as the system does.
+fn raise_file_limit(wanted: u64) {
+    #[cfg(unix)]
+    match rlimit::increase_nofile_limit(wanted) {
+        Ok(allowed) if allowed >= wanted => {}
+        Ok(allowed) => tracing::warn!(
+            "the system allows {allowed} open files, so fewer than {wanted} connections: raise it with ulimit -n"
+        ),
+        Err(error) => tracing::warn!("the limit of open files stays as it is: {error}"),
+    }
+    #[cfg(not(unix))]
+    let _ = wanted;
+}

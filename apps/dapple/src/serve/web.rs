@@ -1,0 +1,164 @@
+//! What the server answers over HTTP: the page, the scene, figures, and the door to the live session.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use axum::{Extension, Router};
+use axum::extract::ws::WebSocketUpgrade;
+use axum::extract::{Path, State};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::response::{Html, IntoResponse, Response};
+use axum::routing::get;
+use dapple_session::MAX_FROM_VIEWER_BYTES;
+use serde_json::json;
+use tower_http::compression::CompressionLayer;
+use tower_http::services::ServeDir;
+use tower_http::set_header::SetResponseHeaderLayer;
+
+use super::accept::Permit;
+use super::asset::Asset;
+use super::hub::{Phase, SharedHub};
+use super::viewer::talk;
+use crate::page::{FILE_NAME, Spares, ViewerJson};
+use crate::transport::ws;
+
+/// Where viewers connect to.
+pub(crate) const LIVE_PATH: &str = "live";
+
+/// Where the page's scene lies.
+const SCENE_FOLDER: &str = "scene";
+
+#[derive(Clone)]
+struct Shared {
+    hub: SharedHub,
+    asset: Arc<Asset>,
+    viewer_json: Arc<str>,
+}
+
+/// Everything that is served; `page` is the built page's folder, where there is one.
+pub(crate) fn router(hub: SharedHub, asset: Arc<Asset>, page: Option<PathBuf>) -> Router {
+    let json = ViewerJson {
+        scene: format!("{SCENE_FOLDER}/{}", asset.name),
+        stream: None,
+        live: Some(LIVE_PATH.to_owned()),
+        animation: asset.scene.active_animation,
+        spares: asset.spares.iter().map(|spare| Spares { instance: spare.instance, count: spare.count }).collect(),
+    };
+    let viewer_json = serde_json::to_string_pretty(&json).expect("it is made of names and numbers").into();
+    let shared = Shared { hub, asset, viewer_json };
+    // Anyone may show the scene in a page of theirs; who may change it is a matter of tokens.
+    let open = SetResponseHeaderLayer::overriding(
+        header::ACCESS_CONTROL_ALLOW_ORIGIN,
+        HeaderValue::from_static("*"),
+    );
+    let router = Router::new()
+        .route(&format!("/{FILE_NAME}"), get(viewer_json_answer))
+        .route(&format!("/{SCENE_FOLDER}/{{name}}"), get(scene_answer))
+        .route(&format!("/{LIVE_PATH}"), get(live_answer))
+        .route("/health", get(health_answer))
+        .route("/metrics", get(metrics_answer))
+        .with_state(shared)
+        .layer(open);
+    match page {
+        Some(folder) => {
+            let files = Router::new()
+                .fallback_service(ServeDir::new(folder))
+                // A page that was built anew must not meet an old program.
+                .layer(SetResponseHeaderLayer::overriding(
+                    header::CACHE_CONTROL,
+                    HeaderValue::from_static("no-cache"),
+                ))
+                .layer(CompressionLayer::new().gzip(true));
+            router.fallback_service(files)
+        }
+        None => router.route("/", get(no_page_answer)),
+    }
+}
+
+async fn viewer_json_answer(State(shared): State<Shared>) -> Response {
+    let headers = [(header::CONTENT_TYPE, "application/json"), (header::CACHE_CONTROL, "no-cache")];
+    (headers, shared.viewer_json.to_string()).into_response()
+}
+
+/// The scene under the name of its content: who has it need never ask again.
+async fn scene_answer(State(shared): State<Shared>, Path(name): Path<String>, asked: HeaderMap) -> Response {
+    let asset = &shared.asset;
+    if name != asset.name {
+        let message = "this is not the scene that is lit here now: reload the page\n";
+        return (StatusCode::NOT_FOUND, message).into_response();
+    }
+    let takes_gzip = asked
+        .get(header::ACCEPT_ENCODING)
+        .and_then(|value| value.to_str().ok())
+        .is_some_and(|value| value.split(',').any(|coding| coding.trim().starts_with("gzip")));
+    let mut headers = HeaderMap::new();
+    headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("model/gltf-binary"));
+    headers.insert(header::VARY, HeaderValue::from_static("accept-encoding"));
+    headers.insert(
+        header::CACHE_CONTROL,
+        HeaderValue::from_static("public, max-age=31536000, immutable"),
+    );
+    match asset.gzip.clone().filter(|_| takes_gzip) {
+        Some(packed) => {
+            headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+            (headers, packed).into_response()
+        }
+        None => (headers, asset.plain.clone()).into_response(),
+    }
+}
+
+async fn live_answer(
+    State(shared): State<Shared>,
+    Extension(permit): Extension<Permit>,
+    upgrade: WebSocketUpgrade,
+) -> Response {
+    upgrade
+        .max_message_size(MAX_FROM_VIEWER_BYTES)
+        .max_frame_size(MAX_FROM_VIEWER_BYTES)
+        // What cannot be sent waits in the host, where newer light takes its place.
+        .write_buffer_size(0)
+        .max_write_buffer_size(1 << 20)
+        .on_upgrade(async move |socket| {
+            let (out, inbound) = ws::accepted(socket);
+            talk(shared.hub, out, inbound).await;
+            drop(permit);
+        })
+}
+
+async fn health_answer(State(shared): State<Shared>) -> Response {
+    let phase = shared.hub.phase();
+    let (status, name, detail) = match &phase {
+        Phase::Starting(what, mille) => {
+            (StatusCode::OK, "starting", format!("{what}, {:.0} %", f64::from(*mille) / 10.0))
+        }
+        Phase::Serving => (StatusCode::OK, "serving", String::new()),
+        Phase::Draining => (StatusCode::SERVICE_UNAVAILABLE, "draining", String::new()),
+        Phase::Failed(reason) => (StatusCode::SERVICE_UNAVAILABLE, "failed", reason.clone()),
+    };
+    let ready = phase == Phase::Serving;
+    let body = json!({
+        "status": name, "ready": ready, "detail": detail, "scene": shared.asset.title,
+        "version": env!("CARGO_PKG_VERSION"),
+    });
+    let headers = [(header::CONTENT_TYPE, "application/json"), (header::CACHE_CONTROL, "no-store")];
+    (status, headers, format!("{body}\n")).into_response()
+}
+
+async fn metrics_answer(State(shared): State<Shared>) -> Response {
+    let counts = shared.hub.host().counts();
+    let kind = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+    ([(header::CONTENT_TYPE, kind), (header::CACHE_CONTROL, "no-store")], shared.hub.figures.text(&counts))
+        .into_response()
+}
+
+async fn no_page_answer(State(shared): State<Shared>, headers: HeaderMap) -> Html<String> {
+    let host = headers.get(header::HOST).and_then(|host| host.to_str().ok()).unwrap_or("this host");
+    let escape = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;");
+    Html(format!(
+        "<!doctype html><title>Dapple</title><h1>{} is lit here</h1><p>The page that shows it has not been built: run \
+         <code>cargo xtask wasm</code> and start again, or name its folder with <code>--page</code>.<p>Without it: \
+         <code>dapple view --url http://{}/</code>",
+        escape(&shared.asset.title),
+        escape(host)
+    ))
+}

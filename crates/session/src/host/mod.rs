@@ -1,0 +1,541 @@
+//! The server's end: who may do what, the scene's state, and what each viewer gets next.
+
+mod access;
+mod bucket;
+mod ladder;
+mod state;
+mod viewer;
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+
+use dapple_scene::{Edits, Scene};
+use dapple_stream::Frame;
+
+pub use access::Access;
+use ladder::Rung;
+use state::SceneState;
+use viewer::Viewer;
+
+use crate::{
+    Event, FromHost, FromViewer, Hello, LightHead, LookCamera, PROTOCOL, Reason, Refusal, Role, SceneClock,
+    Welcome,
+};
+
+/// Settings of a host.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HostConfig {
+    /// Updates a second, as it tells viewers.
+    pub hz: f64,
+    /// Most viewers at a time, those counted that may still come back. Default 2000.
+    pub max_viewers: u32,
+    /// Most events a second of one viewer, on average; four seconds' worth may come at once. Default 60.
+    pub events_per_s: u32,
+    /// Most messages a second of one viewer, on average; more end its connection. Default 400.
+    pub messages_per_s: u32,
+    /// After so long without a message a viewer is let go, microseconds. Default 15 s.
+    pub silence_us: u64,
+    /// For so long a viewer whose connection broke may come back and go on, microseconds. Default 60 s.
+    pub resume_us: u64,
+    /// Light is held back while light that was sent so long ago has not come yet, microseconds. Default 0.5 s.
+    pub window_us: u64,
+    /// Who may do what. By default everyone may do everything.
+    pub access: Access,
+    /// Streams of the same light under different budgets, most bits in any second; `None` is without one. A viewer gets the richest that is within
+    /// what it asked for, or else the leanest. Default: one without a budget.
+    pub rungs: Vec<Option<u64>>,
+    /// Whether scene time runs at the start. Default true.
+    pub playing: bool,
+}
+
+impl Default for HostConfig {
+    fn default() -> Self {
+        HostConfig {
+            hz: 30.0,
+            max_viewers: 2000,
+            events_per_s: 60,
+            messages_per_s: 400,
+            silence_us: 15_000_000,
+            resume_us: 60_000_000,
+            window_us: 500_000,
+            access: Access::default(),
+            rungs: vec![None],
+            playing: true,
+        }
+    }
+}
+
+/// One connection of one viewer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Link {
+    /// The viewer.
+    pub viewer: u64,
+    /// Counts its connections.
+    pub connection: u32,
+}
+
+/// What is known of a connection when a viewer joins over it.
+#[derive(Clone, Debug)]
+pub struct Arrival {
+    /// A secret for the viewer, that nobody can guess, should it be a new one.
+    pub key: String,
+    /// Whether what is sent comes, once and in order, unless the connection breaks.
+    pub is_reliable: bool,
+    /// Microseconds since 1970.
+    pub unix_us: u64,
+}
+
+/// A message to be sent.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Outgoing {
+    /// As text.
+    Text(Arc<str>),
+    /// As bytes.
+    Bytes(Arc<[u8]>),
+}
+
+/// What a connection is to do now.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Next {
+    /// Send this and ask again.
+    Send(Outgoing),
+    /// Ask again after the next step, or after the viewer's next message.
+    Wait,
+    /// Send the refusal and close.
+    Close(Refusal),
+}
+
+/// What a step is to light.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tick {
+    /// The host's clock, microseconds.
+    pub stamp_us: u64,
+    /// The scene's time, microseconds.
+    pub scene_us: u64,
+    /// Version of the scene's state.
+    pub state: u64,
+    /// What was changed of the scene, if that is not what it was in the step before.
+    pub edits: Option<Edits>,
+}
+
+/// Sums for whoever watches the host.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct HostCounts {
+    /// Viewers connected now.
+    pub viewers: u32,
+    /// Viewers ever welcomed.
+    pub joined: u64,
+    /// Of them, again after a broken connection.
+    pub resumed: u64,
+    /// Hellos refused.
+    pub refused: u64,
+    /// Connections ended by the host, for what a viewer did or did not do.
+    pub expelled: u64,
+    /// Events that changed something, and those that were rejected.
+    pub events: u64,
+    /// See `events`.
+    pub rejected: u64,
+    /// Snapshots given out, and frames that build on what a viewer has.
+    pub snapshots: u64,
+    /// See `snapshots`.
+    pub deltas: u64,
+    /// Of the snapshots, those to viewers that had fallen behind.
+    pub jumps: u64,
+    /// Bytes given out.
+    pub bytes: u64,
+}
+
+/// Most ages kept between two questions.
+const MAX_AGES: usize = 1 << 16;
+
+/// Most events that wait for the next step.
+const MAX_QUEUED_EVENTS: usize = 4096;
+
+/// The server's end of all sessions.
+pub struct Host {
+    config: HostConfig,
+    scene: Arc<Scene>,
+    scene_hash: String,
+    state: SceneState,
+    viewers: BTreeMap<u64, Viewer>,
+    next_viewer: u64,
+    /// What came since the last step, by viewer and number; `None` for what was rejected as it came.
+    queue: VecDeque<(u64, u32, Option<Event>)>,
+    rungs: Vec<Rung>,
+    /// The last step's message for those who get no light with it.
+    tick: Option<Arc<[u8]>>,
+    closing: Option<Refusal>,
+    counts: HostCounts,
+    ages_us: Vec<u32>,
+    told_version: u64,
+}
+
+impl Host {
+    /// A host of a scene, at moment `now_us` of its clock.
+    pub fn new(scene: Arc<Scene>, mut config: HostConfig, now_us: u64) -> Host {
+        // The richest first.
+        config.rungs.sort_by_key(|bits| std::cmp::Reverse(bits.unwrap_or(u64::MAX)));
+        config.rungs.dedup();
+        if config.rungs.is_empty() {
+            config.rungs.push(None);
+        }
+        let clock = SceneClock { playing: config.playing, time_us: 0, at_us: now_us };
+        Host {
+            scene_hash: hex(&scene.hash().0),
+            state: SceneState::new(&scene, clock),
+            scene,
+            viewers: BTreeMap::new(),
+            next_viewer: 1,
+            queue: VecDeque::new(),
+            rungs: config.rungs.iter().map(|_| Rung::default()).collect(),
+            tick: None,
+            closing: None,
+            counts: HostCounts::default(),
+            ages_us: Vec::new(),
+            told_version: 0,
+            config,
+        }
+    }
+
+    /// Its settings; the rungs from the richest to the leanest.
+    pub fn config(&self) -> &HostConfig {
+        &self.config
+    }
+
+    /// Lets a viewer in, or says why not. Then [`Host::next`] gives what it is to be sent.
+    ///
+    /// # Errors
+    /// The refusal to be sent.
+    pub fn join(&mut self, hello: &Hello, arrival: Arrival, now_us: u64) -> Result<Link, Refusal> {
+        let admitted = self.admit(hello, arrival, now_us);
+        if admitted.is_err() {
+            self.counts.refused += 1;
+        }
+        admitted
+    }
+
+    fn admit(&mut self, hello: &Hello, arrival: Arrival, now_us: u64) -> Result<Link, Refusal> {
+        if let Some(refusal) = &self.closing {
+            return Err(refusal.clone());
+        }
+        let wire = dapple_stream::codec::VERSION;
+        if hello.protocol != PROTOCOL || hello.wire != wire {
+            return Err(Refusal::new(
+                Reason::Version,
+                format!(
+                    "the viewer speaks protocol {} with frames of version {}, this host {PROTOCOL} and {wire}: reload the page, or \
+                     use a viewer of the host's own version",
+                    hello.protocol, hello.wire
+                ),
+            ));
+        }
+        if !hello.scene.eq_ignore_ascii_case(&self.scene_hash) {
+            return Err(Refusal::new(
+                Reason::Scene,
+                format!(
+                    "the viewer has loaded scene {:.16}, this host lights {:.16}: fetch the scene anew",
+                    hello.scene, self.scene_hash
+                ),
+            ));
+        }
+        let role = self.config.access.role(hello.token.as_deref())?;
+        let known = hello.key.as_deref().and_then(|key| {
+            self.viewers.iter().find(|(_, viewer)| access::equal(&viewer.key, key)).map(|(id, _)| *id)
+        });
+        let id = match known {
+            Some(id) => {
+                self.counts.resumed += 1;
+                id
+            }
+            None => {
+                if self.viewers.len() >= self.config.max_viewers as usize {
+                    self.forget_one_that_left()?;
+                }
+                let id = self.next_viewer;
+                self.next_viewer += 1;
+                self.viewers.insert(id, Viewer::new(arrival.key, &self.config, now_us));
+                id
+            }
+        };
+        let rung = self.rung_for(hello.bits_per_s);
+        let bits_per_s = self.config.rungs[rung];
+        let viewer = self.viewers.get_mut(&id).expect("it was found or inserted");
+        viewer.connect(role, rung, hello.held, arrival.is_reliable, now_us);
+        viewer.tell(&FromHost::Welcome(Welcome {
+            protocol: PROTOCOL,
+            viewer: id,
+            key: viewer.key.clone(),
+            role,
+            hz: self.config.hz,
+            heard: viewer.events_done,
+            bits_per_s,
+            events_per_s: self.config.events_per_s,
+            clock_us: now_us,
+            unix_us: arrival.unix_us,
+        }));
+        self.counts.joined += 1;
+        Ok(Link { viewer: id, connection: viewer.connection })
+    }
+
+    /// Makes room by forgetting who left first.
+    fn forget_one_that_left(&mut self) -> Result<(), Refusal> {
+        let gone = self.viewers.iter().filter_map(|(id, viewer)| Some((viewer.left_us?, *id))).min();
+        let Some((_, id)) = gone else {
+            let most = self.config.max_viewers;
+            let message = format!("{most} viewers are here already, which is the most: try again later");
+            return Err(Refusal::new(Reason::Full, message));
+        };
+        self.viewers.remove(&id);
+        Ok(())
+    }
+
+    /// The richest stream within a wish.
+    fn rung_for(&self, bits_per_s: Option<u64>) -> usize {
+        let Some(wish) = bits_per_s else { return 0 };
+        let within = |bits: &Option<u64>| bits.is_some_and(|bits| bits <= wish);
+        self.config.rungs.iter().position(within).unwrap_or(self.config.rungs.len() - 1)
+    }
+
+    /// Takes a text of a viewer.
+    ///
+    /// # Errors
+    /// The refusal to be sent before its connection is closed; the viewer has left then.
+    pub fn receive(&mut self, link: Link, text: &str, now_us: u64) -> Result<(), Refusal> {
+        let taken = self.take(link, text, now_us);
+        if taken.is_err() {
+            self.counts.expelled += 1;
+            self.leave(link, now_us);
+        }
+        taken
+    }
+
+    fn take(&mut self, link: Link, text: &str, now_us: u64) -> Result<(), Refusal> {
+        let Some(viewer) = connected(&mut self.viewers, link) else { return Ok(()) };
+        if !viewer.messages.take(now_us) {
+            let most = self.config.messages_per_s;
+            let message = format!("more than {most} messages a second: send less often");
+            return Err(Refusal::new(Reason::TooMany, message));
+        }
+        viewer.last_message_us = now_us;
+        let message = FromViewer::parse(text)
+            .map_err(|error| Refusal::new(Reason::Malformed, error.to_string()))?;
+        match message {
+            FromViewer::Hello(_) => {
+                Err(Refusal::new(Reason::Malformed, "a second hello over the same connection"))
+            }
+            FromViewer::Look(look) => {
+                if let Some(age_us) = viewer.look(&look, now_us)
+                    && self.ages_us.len() < MAX_AGES
+                {
+                    self.ages_us.push(age_us);
+                }
+                Ok(())
+            }
+            FromViewer::Event { number, event } => {
+                // What was heard before needs no answer but that; what does not follow comes again.
+                if number != viewer.events_taken.wrapping_add(1) {
+                    viewer.answer_events();
+                    return Ok(());
+                }
+                let refused = if viewer.role < Role::Interact {
+                    Some("events need the role interact: connect with its token".to_owned())
+                } else if !viewer.events.take(now_us) {
+                    let most = self.config.events_per_s;
+                    Some(format!("more than {most} events a second: send less often"))
+                } else if self.queue.len() >= MAX_QUEUED_EVENTS {
+                    Some("too many events of all viewers wait for the next step: try again".to_owned())
+                } else {
+                    None
+                };
+                viewer.events_taken = number;
+                let event = if let Some(message) = refused {
+                    self.counts.rejected += 1;
+                    viewer.tell(&FromHost::Rejected { number, message });
+                    None
+                } else {
+                    Some(event)
+                };
+                self.queue.push_back((link.viewer, number, event));
+                Ok(())
+            }
+            FromViewer::Bye => {
+                self.viewers.remove(&link.viewer);
+                Ok(())
+            }
+        }
+    }
+
+    /// The connection has ended, for whatever reason.
+    pub fn leave(&mut self, link: Link, now_us: u64) {
+        if let Some(viewer) = connected(&mut self.viewers, link) {
+            viewer.left_us = Some(now_us);
+        }
+    }
+
+    /// What a connection is to do now.
+    pub fn next(&mut self, link: Link, now_us: u64) -> Next {
+        let closing = self.closing.clone();
+        let Some(viewer) = self.viewers.get_mut(&link.viewer).filter(|v| v.connection == link.connection)
+        else {
+            let message = "the viewer came again over another connection, or said goodbye";
+            return Next::Close(Refusal::new(Reason::Replaced, message));
+        };
+        if let Some(refusal) = viewer.expelled.take().or(closing) {
+            self.leave(link, now_us);
+            return Next::Close(refusal);
+        }
+        if let Some(text) = viewer.control.pop_front() {
+            self.counts.bytes += text.len() as u64;
+            return Next::Send(Outgoing::Text(text));
+        }
+        if let Some(message) = self.state.news(viewer.state_sent) {
+            viewer.state_sent = self.state.version();
+            self.counts.bytes += message.len() as u64;
+            return Next::Send(Outgoing::Text(message));
+        }
+        let rung = &mut self.rungs[viewer.rung];
+        let Some(bytes) = viewer.next_light(rung, self.tick.as_ref(), &mut self.counts, &self.config, now_us)
+        else {
+            return Next::Wait;
+        };
+        self.counts.bytes += bytes.len() as u64;
+        Next::Send(Outgoing::Bytes(bytes))
+    }
+
+    /// Begins a step: events that have come take effect, and who is gone is forgotten.
+    pub fn begin_step(&mut self, now_us: u64) -> Tick {
+        let (silence_us, resume_us) = (self.config.silence_us, self.config.resume_us);
+        self.viewers.retain(|_, viewer| {
+            viewer.left_us.is_none_or(|left_us| now_us.saturating_sub(left_us) <= resume_us)
+        });
+        for viewer in self.viewers.values_mut().filter(|viewer| viewer.left_us.is_none()) {
+            if now_us.saturating_sub(viewer.last_message_us) > silence_us && viewer.expelled.is_none() {
+                self.counts.expelled += 1;
+                let message = format!("no message for {} s", silence_us / 1_000_000);
+                viewer.expelled = Some(Refusal::new(Reason::Silent, message));
+            }
+        }
+        let mut batch = self.state.batch(now_us);
+        for (id, number, event) in self.queue.drain(..) {
+            let applied = event.map(|event| batch.apply(&self.scene, event));
+            match &applied {
+                Some(Ok(())) => self.counts.events += 1,
+                Some(Err(_)) => self.counts.rejected += 1,
+                None => {}
+            }
+            if let Some(viewer) = self.viewers.get_mut(&id) {
+                viewer.events_done = viewer.events_done.max(number);
+                if let Some(Err(message)) = applied {
+                    viewer.tell(&FromHost::Rejected { number, message });
+                }
+            }
+        }
+        batch.end();
+        for viewer in self.viewers.values_mut() {
+            viewer.answer_events();
+        }
+        let version = self.state.version();
+        let edits = (version != self.told_version).then(|| self.state.edits().clone());
+        self.told_version = version;
+        let scene_us = self.state.clock().time_us(now_us);
+        Tick { stamp_us: now_us, scene_us, state: version, edits }
+    }
+
+    /// Gives out what a step made for a rung; nothing where it changed nothing.
+    pub fn publish(&mut self, rung: usize, tick: &Tick, frame: Option<&Frame>, made_us: u64) {
+        if let Some(frame) = frame {
+            self.rungs[rung].publish(tick.head(made_us), frame);
+        }
+    }
+
+    /// Whether someone waits for a snapshot of a rung.
+    pub fn wants_snapshot(&self, rung: usize) -> bool {
+        self.rungs[rung].is_wanted()
+    }
+
+    /// Gives a snapshot of what a rung's viewers hold who are up to date.
+    pub fn put_snapshot(&mut self, rung: usize, tick: &Tick, frame: &Frame, made_us: u64) {
+        self.rungs[rung].put_snapshot(tick.head(made_us), frame);
+    }
+
+    /// Ends a step: who has nothing else to hear learns that the light is still right.
+    pub fn end_step(&mut self, tick: &Tick, made_us: u64, mut status: crate::Status) {
+        self.tick = tick.head(made_us).messages(&[]).pop();
+        status.viewers = self.viewers.values().filter(|viewer| viewer.left_us.is_none()).count() as u32;
+        status.step_us = made_us.saturating_sub(tick.stamp_us);
+        for viewer in self.viewers.values_mut().filter(|viewer| viewer.left_us.is_none()) {
+            viewer.tell_status(&status, made_us);
+        }
+    }
+
+    /// How many viewers a rung has now.
+    pub fn rung_viewers(&self, rung: usize) -> usize {
+        self.viewers.values().filter(|viewer| viewer.left_us.is_none() && viewer.rung == rung).count()
+    }
+
+    /// The cameras of viewers, at most so many: where there are more, others each time.
+    pub fn looks(&self, most: usize, turn: u64) -> Vec<LookCamera> {
+        let all: Vec<LookCamera> = self
+            .viewers
+            .values()
+            .filter(|viewer| viewer.left_us.is_none())
+            .filter_map(|viewer| viewer.camera)
+            .collect();
+        if all.len() <= most {
+            return all;
+        }
+        let start = (turn as usize).wrapping_mul(most) % all.len();
+        all.iter().cycle().skip(start).take(most).copied().collect()
+    }
+
+    /// What has happened since the start.
+    pub fn counts(&self) -> HostCounts {
+        let viewers = self.viewers.values().filter(|viewer| viewer.left_us.is_none()).count() as u32;
+        HostCounts { viewers, ..self.counts.clone() }
+    }
+
+    /// Ages of light (microseconds) as viewers have told them since this was last asked for: from the step's start to its coming, and back.
+    pub fn take_ages(&mut self) -> Vec<u32> {
+        std::mem::take(&mut self.ages_us)
+    }
+
+    /// Ends all sessions, and lets nobody in any more.
+    pub fn close(&mut self) {
+        let message = "the host has been stopped: it may come back";
+        self.closing = Some(Refusal::new(Reason::Closing, message));
+    }
+
+    /// The scene's state now: version, clock, and what was changed.
+    pub fn state(&self) -> (u64, SceneClock, &Edits) {
+        (self.state.version(), self.state.clock(), self.state.edits())
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.scene
+    }
+}
+
+impl Tick {
+    fn head(&self, made_us: u64) -> LightHead {
+        LightHead {
+            stamp_us: self.stamp_us,
+            made_us: made_us.max(self.stamp_us),
+            scene_us: self.scene_us,
+            state: self.state,
+            total: 0,
+            offset: 0,
+        }
+    }
+}
+
+fn connected(viewers: &mut BTreeMap<u64, Viewer>, link: Link) -> Option<&mut Viewer> {
+    viewers
+        .get_mut(&link.viewer)
+        .filter(|viewer| viewer.connection == link.connection && viewer.left_us.is_none())
+}
+
+/// Bytes as hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}

@@ -1,0 +1,197 @@
+//! Messages that are bytes: frames of light, in pieces, each with the moment that it belongs to.
+
+use crate::MessageError;
+
+/// Most bytes of a frame in one message.
+pub const CHUNK_BYTES: usize = 64 << 10;
+
+/// Bytes before them: see [`LightHead`].
+const HEAD_BYTES: usize = 1 + 4 * 8 + 2 * 4;
+
+/// Longest message of light.
+pub const MAX_LIGHT_MESSAGE_BYTES: usize = HEAD_BYTES + CHUNK_BYTES;
+
+/// The first byte.
+const KIND: u8 = b'L';
+
+/// Says what a piece of light is. On the wire: the letter `L`, then the fields in their order, little-endian.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LightHead {
+    /// The host's clock as the step began, microseconds: what it names is as old as that.
+    pub stamp_us: u64,
+    /// The host's clock when the step was done.
+    pub made_us: u64,
+    /// The scene's time in the step, microseconds.
+    pub scene_us: u64,
+    /// Version of the scene's state in the step.
+    pub state: u64,
+    /// Bytes of the frame; 0 for a step that changed nothing.
+    pub total: u32,
+    /// Where in the frame this piece begins.
+    pub offset: u32,
+}
+
+impl LightHead {
+    /// The messages that carry a frame, none of which is longer than [`MAX_LIGHT_MESSAGE_BYTES`]; one without bytes for no frame.
+    pub fn messages(mut self, frame: &[u8]) -> Vec<std::sync::Arc<[u8]>> {
+        self.total = frame.len() as u32;
+        let pieces = frame.chunks(CHUNK_BYTES).chain(frame.is_empty().then_some(&[][..]));
+        let mut offset = 0;
+        pieces
+            .map(|piece| {
+                let mut bytes = Vec::with_capacity(HEAD_BYTES + piece.len());
+                bytes.push(KIND);
+                for field in [self.stamp_us, self.made_us, self.scene_us, self.state] {
+                    bytes.extend(field.to_le_bytes());
+                }
+                bytes.extend(self.total.to_le_bytes());
+                bytes.extend(u32::to_le_bytes(offset));
+                bytes.extend(piece);
+                offset += piece.len() as u32;
+                bytes.into()
+            })
+            .collect()
+    }
+
+    /// Reads a message: the head, and the piece of the frame.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn parse(message: &[u8]) -> Result<(LightHead, &[u8]), MessageError> {
+        if message.len() > MAX_LIGHT_MESSAGE_BYTES {
+            return Err(MessageError::TooLong { bytes: message.len(), limit: MAX_LIGHT_MESSAGE_BYTES });
+        }
+        let (head, piece) =
+            message.split_at_checked(HEAD_BYTES).ok_or(MessageError::Light("a message is cut off"))?;
+        if head[0] != KIND {
+            return Err(MessageError::Light("a message of bytes does not begin with L"));
+        }
+        let long = |at: usize| u64::from_le_bytes(head[at..at + 8].try_into().expect("eight bytes"));
+        let short = |at: usize| u32::from_le_bytes(head[at..at + 4].try_into().expect("four bytes"));
+        let head = LightHead {
+            stamp_us: long(1),
+            made_us: long(9),
+            scene_us: long(17),
+            state: long(25),
+            total: short(33),
+            offset: short(37),
+        };
+        let end = u64::from(head.offset) + piece.len() as u64;
+        let fits = end <= u64::from(head.total) && (piece.is_empty() == (head.total == 0));
+        if !fits || head.made_us < head.stamp_us {
+            return Err(MessageError::Light("a piece does not fit its frame"));
+        }
+        Ok((head, piece))
+    }
+}
+
+/// Puts pieces together that come in order; whatever does not follow starts anew or is dropped.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Assembly {
+    head: LightHead,
+    bytes: Vec<u8>,
+}
+
+/// What a piece came to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Assembled {
+    /// A whole frame (empty for none).
+    Whole(LightHead, Vec<u8>),
+    /// More is to come.
+    Part,
+    /// It does not follow what came before: something was lost on the way.
+    Gap,
+}
+
+impl Assembly {
+    /// Takes the next piece of frames that have at most so many bytes.
+    pub(crate) fn push(&mut self, head: LightHead, piece: &[u8], max_bytes: usize) -> Assembled {
+        if head.total as usize > max_bytes {
+            self.bytes.clear();
+            return Assembled::Gap;
+        }
+        if head.offset == 0 {
+            // What was begun is never finished then.
+            self.bytes.clear();
+            self.head = head;
+        } else {
+            let same = LightHead { offset: self.head.offset, ..head } == self.head;
+            if !same || head.offset as usize != self.bytes.len() {
+                self.bytes.clear();
+                return Assembled::Gap;
+            }
+        }
+        self.bytes.extend_from_slice(piece);
+        if self.bytes.len() < head.total as usize {
+            return Assembled::Part;
+        }
+        Assembled::Whole(self.head, std::mem::take(&mut self.bytes))
+    }
+
+    /// Bytes of an unfinished frame that have come, and all of it.
+    pub(crate) fn progress(&self) -> (usize, usize) {
+        if self.bytes.is_empty() { (0, 0) } else { (self.bytes.len(), self.head.total as usize) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_of_every_length_come_through() {
+        for length in [0, 1, CHUNK_BYTES - 1, CHUNK_BYTES, CHUNK_BYTES + 1, 3 * CHUNK_BYTES] {
+            let frame: Vec<u8> = (0..length).map(|i| (i * 7 % 251) as u8).collect();
+            let head = LightHead { stamp_us: 5, made_us: 9, scene_us: 1 << 40, state: 3, total: 0, offset: 0 };
+            let messages = head.messages(&frame);
+            assert!(messages.iter().all(|message| message.len() <= MAX_LIGHT_MESSAGE_BYTES));
+            let mut assembly = Assembly::default();
+            for (index, message) in messages.iter().enumerate() {
+                let (head, piece) = LightHead::parse(message).unwrap();
+                let assembled = assembly.push(head, piece, 1 << 20);
+                if index + 1 < messages.len() {
+                    assert_eq!(assembled, Assembled::Part);
+                    assert_eq!(assembly.progress(), ((index + 1) * CHUNK_BYTES, length));
+                } else {
+                    let Assembled::Whole(whole, bytes) = assembled else { panic!("{assembled:?}") };
+                    assert_eq!((whole.scene_us, whole.state, bytes), (1 << 40, 3, frame.clone()));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn pieces_that_do_not_follow_are_no_frame() {
+        let frame = vec![1; 3 * CHUNK_BYTES];
+        let messages = LightHead::default().messages(&frame);
+        let mut assembly = Assembly::default();
+        let mut push = |index: usize| {
+            let (head, piece) = LightHead::parse(&messages[index]).unwrap();
+            assembly.push(head, piece, 1 << 20)
+        };
+        assert_eq!(push(0), Assembled::Part);
+        assert_eq!(push(2), Assembled::Gap);
+        assert_eq!(push(1), Assembled::Gap);
+        assert_eq!(push(0), Assembled::Part);
+        assert_eq!(push(1), Assembled::Part);
+        assert!(matches!(push(2), Assembled::Whole(..)));
+        let (head, piece) = LightHead::parse(&messages[0]).unwrap();
+        assert_eq!(Assembly::default().push(head, piece, 1000), Assembled::Gap, "larger than is taken");
+    }
+
+    #[test]
+    fn broken_messages_are_refused() {
+        let good = LightHead { made_us: 1, ..LightHead::default() }.messages(&[1, 2, 3]);
+        assert!(LightHead::parse(&good[0]).is_ok());
+        for length in 0..good[0].len() {
+            let cut = LightHead::parse(&good[0][..length]);
+            assert!(cut.is_err() || length > HEAD_BYTES, "{length}");
+        }
+        let mut other = good[0].to_vec();
+        other[0] = b'M';
+        assert!(LightHead::parse(&other).is_err());
+        let longer = [&good[0][..], &[4]].concat();
+        assert!(LightHead::parse(&longer).is_err());
+        assert!(LightHead::parse(&vec![b'L'; MAX_LIGHT_MESSAGE_BYTES + 1]).is_err());
+    }
+}
