@@ -10,7 +10,7 @@ mod population;
 use std::sync::Arc;
 
 use dapple_scene::glam::Vec3;
-use dapple_scene::{Pose, Scene};
+use dapple_scene::{Edits, Pose, Scene};
 use dapple_store::points::{LayoutError, PointStore};
 use dapple_stream::{Budget, Frame, FrameKind, Precision, Publisher, PublisherConfig, Spending};
 use dapple_trace::Tracer;
@@ -147,6 +147,8 @@ pub struct StepReport {
 #[derive(Clone)]
 pub struct Server {
     scene: Arc<Scene>,
+    /// What the next step's pose goes by.
+    edits: Edits,
     tracer: Tracer,
     updater: Updater,
     publisher: Publisher,
@@ -215,7 +217,8 @@ impl Server {
         publisher.publish(updater.store());
         let budget = config.bits_per_s.map(Budget::new);
         let tolerance = config.publish.precision.tolerance;
-        Ok(Server { scene, tracer, updater, publisher, budget, tolerance, dropped_inside, population: None })
+        let (edits, population) = (Edits::new(&scene), None);
+        Ok(Server { scene, edits, tracer, updater, publisher, budget, tolerance, dropped_inside, population })
     }
 
     /// Brings the scene to `now_s` (seconds) and publishes what changed. Time may run in any direction. Takes as many rays
@@ -238,7 +241,7 @@ impl Server {
         sent_s: f64,
         input: &StepInput<'_>,
     ) -> Result<StepReport, ServerError> {
-        let pose = self.scene.pose(now_s);
+        let pose = self.scene.pose_edited(now_s, &self.edits);
         self.tracer.update(&self.scene, &pose);
         let (mut spawned, mut evicted) = (Vec::new(), 0);
         if let Some(population) = &mut self.population {
@@ -275,6 +278,17 @@ impl Server {
             spawned: spawned.len() as u32,
             evicted,
         })
+    }
+
+    /// From the next step on the scene is changed like this. The edits must be ones that [`Edits::check`] lets pass, and every client
+    /// must draw with the same. What becomes visible or dark by them is traced as if it had moved by itself.
+    pub fn set_edits(&mut self, edits: Edits) {
+        self.edits = edits;
+    }
+
+    /// What viewers have changed; as at first ([`Edits::new`]) until [`Server::set_edits`].
+    pub fn edits(&self) -> &Edits {
+        &self.edits
     }
 
     /// From now on deltas take at most so many bits in any second; `None`: as many as they need.
