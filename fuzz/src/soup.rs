@@ -116,6 +116,7 @@ fn scene(triangles: &[[Vec3; 3]], maps: &[Affine3A]) -> (Scene, Pose) {
         casts: true,
         receives: true,
         rest_from_mesh: Mat3::IDENTITY,
+        spare: false,
     };
     let scene = Scene {
         meshes: vec![mesh],

@@ -23,7 +23,7 @@ use dapple_render::image::LinearImage;
 use dapple_render::psao::atlas::{AtlasParams, PointChange, VisibilityAtlas};
 use dapple_render::psao::{Kernel, PointIndex, reconstruct};
 use dapple_render::shade::{ShadeParams, Shaded, render_shadow_maps, shade};
-use dapple_scene::{Pose, PosedCamera, Scene};
+use dapple_scene::{Edits, Pose, PosedCamera, Scene};
 use dapple_store::charts::Cuts;
 use dapple_store::points::PointStore;
 use dapple_stream::{Applied, Limits, ReceiveError, Subscriber};
@@ -31,6 +31,7 @@ use dapple_stream::{Applied, Limits, ReceiveError, Subscriber};
 /// One viewer's copy of the light, and the passes that draw with it.
 pub struct Client {
     scene: Arc<Scene>,
+    edits: Edits,
     subscriber: Subscriber,
     /// Made when they are first needed.
     index: OnceLock<PointIndex>,
@@ -89,7 +90,8 @@ impl Client {
     pub fn new(scene: Arc<Scene>, mut limits: Limits) -> Client {
         limits.max_sets = limits.max_sets.max(u32::try_from(scene.instances.len()).unwrap_or(u32::MAX));
         let subscriber = Subscriber::new(Some(scene.hash().0), limits);
-        Client { scene, subscriber, index: OnceLock::new(), atlas: OnceLock::new() }
+        let edits = Edits::new(&scene);
+        Client { scene, edits, subscriber, index: OnceLock::new(), atlas: OnceLock::new() }
     }
 
     /// Takes one frame off the wire. On an error nothing has changed.
@@ -120,6 +122,11 @@ impl Client {
         Ok(applied)
     }
 
+    /// Draws the scene changed like this from now on, as the server has it. The edits must be ones that [`Edits::check`] lets pass.
+    pub fn set_edits(&mut self, edits: &Edits) {
+        self.edits.clone_from(edits);
+    }
+
     /// What this client holds; nothing before the first snapshot.
     pub fn store(&self) -> Option<&PointStore> {
         self.subscriber.store()
@@ -142,7 +149,7 @@ impl Client {
         now_s: f64,
         params: &PictureParams,
     ) -> Result<Drawn, RenderError> {
-        draw(&self.scene, camera, now_s, params)
+        draw_posed(&self.scene, self.scene.pose_edited(now_s, &self.edits), camera, params)
     }
 
     /// Visibility of each sample: all open before the first snapshot. The first call after a new layout takes
@@ -177,14 +184,22 @@ impl Client {
     }
 }
 
-/// Draws a scene at `now_s` (seconds) without visibility.
+/// Draws a scene as it was loaded at `now_s` (seconds) without visibility.
 pub fn draw(
     scene: &Scene,
     camera: &PosedCamera,
     now_s: f64,
     params: &PictureParams,
 ) -> Result<Drawn, RenderError> {
-    let pose = scene.pose(now_s);
+    draw_posed(scene, scene.pose(now_s), camera, params)
+}
+
+fn draw_posed(
+    scene: &Scene,
+    pose: Pose,
+    camera: &PosedCamera,
+    params: &PictureParams,
+) -> Result<Drawn, RenderError> {
     let gbuffer = rasterize(scene, &pose, camera, params.width, params.height, params.supersample)?;
     let shadow_maps = render_shadow_maps(scene, &pose, &params.shade);
     let shaded = shade(scene, &pose, camera, &gbuffer, &shadow_maps, &params.shade);

@@ -43,6 +43,7 @@ impl Stage {
             casts: true,
             receives: true,
             rest_from_mesh: Mat3::from(world_from_mesh.matrix3),
+            spare: false,
         });
         self.pose.instances.push(PosedInstance { world_from_mesh, deformed: None });
         self.scene.instances.len() as u32 - 1
@@ -54,6 +55,8 @@ impl Stage {
             light: self.scene.lights.len() as u32 - 1,
             position_world: position,
             direction_world: direction.normalize(),
+            color: Vec3::ONE,
+            intensity,
         });
     }
 

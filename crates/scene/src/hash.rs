@@ -40,7 +40,8 @@ impl Scene {
             h.uint(instance.mesh);
             h.option(instance.skin);
             h.byte(u8::from(instance.casts));
-            h.byte(u8::from(instance.receives));
+            // Beside a flag, so that scenes without spares hash as they did before there were any.
+            h.byte(u8::from(instance.receives) | u8::from(instance.spare) << 1);
             h.floats(&instance.rest_from_mesh.to_cols_array());
         });
         h.list(&self.skins, |h, skin| {

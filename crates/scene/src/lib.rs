@@ -3,12 +3,14 @@
 //! Conventions (glTF's): right-handed, Y up, metres, seconds, radians, linear light. Transforms are named
 //! `a_from_b`; positions and directions say their space (`position_world`, `normal_rest`).
 //!
-//! A [`Scene`] is plain data. [`Scene::pose`] gives everything that moves at one time as a [`Pose`].
+//! A [`Scene`] is plain data. [`Scene::pose`] gives everything that moves at one time as a [`Pose`];
+//! [`Scene::pose_edited`] gives it of a scene that viewers have changed ([`edits`]).
 
 mod animation;
 #[cfg(feature = "builtin")]
 pub mod builtin;
 mod camera;
+pub mod edits;
 mod hash;
 mod light;
 pub mod load;
@@ -24,6 +26,7 @@ mod surface;
 
 pub use animation::{Animation, Channel, ChannelTarget, Interpolation};
 pub use camera::{Camera, PosedCamera, Projection};
+pub use edits::{Edit, EditError, Edits, LightSetting, Placement, Spare, SpareError};
 pub use light::{Light, LightKind, PosedLight};
 pub use load::{Files, LoadError, MeshOrigin, NoFiles, Origins, load, load_with_origins, read_reference};
 pub use material::{AlphaMode, Filter, Image, Material, NormalTexture, Texture, TextureRef, Wrap};

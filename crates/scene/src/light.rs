@@ -42,4 +42,8 @@ pub struct PosedLight {
     pub position_world: Vec3,
     /// Unit direction it shines in (from the light).
     pub direction_world: Vec3,
+    /// Linear RGB: the light's, unless it was edited.
+    pub color: Vec3,
+    /// Candela for point and spot, lux for directional: the light's, unless it was edited.
+    pub intensity: f32,
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, Mat3A, Vec3};
 
 use crate::{PosedCamera, PosedLight};
 
@@ -26,11 +26,23 @@ pub struct Pose {
 /// An instance at one time.
 #[derive(Clone, Debug)]
 pub struct PosedInstance {
-    /// World from mesh space; the identity for skinned instances, whose vertices are posed in the world.
+    /// World from mesh space; the identity for skinned instances, whose vertices are posed in the world; zero for those that
+    /// are not there ([`PosedInstance::is_there`]).
     pub world_from_mesh: Affine3A,
     /// Vertices that replace the mesh's, for skinned and morphed instances; `None` for all others, and for all in a
-    /// pose of [`crate::Scene::pose_undeformed`].
+    /// pose of [`crate::Scene::pose_undeformed`], and those that are not there.
     pub deformed: Option<Arc<DeformedMesh>>,
+}
+
+impl PosedInstance {
+    /// An instance that is not there.
+    pub const REMOVED: PosedInstance = PosedInstance { world_from_mesh: Affine3A::ZERO, deformed: None };
+
+    /// Whether it is anywhere: not if it was removed, or its transform has scale 0 in all directions. What is not there has no
+    /// box, is not drawn, blocks nothing, and its points are nowhere.
+    pub fn is_there(&self) -> bool {
+        self.world_from_mesh.matrix3 != Mat3A::ZERO
+    }
 }
 
 /// Posed vertices: mesh space for morphed meshes, world space for skinned ones (then `world_from_mesh` is the identity).

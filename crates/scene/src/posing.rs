@@ -5,8 +5,8 @@ use std::sync::Arc;
 use glam::{Affine3A, Mat3, Mat3A, Quat, Vec3, Vec3A};
 
 use crate::{
-    Aabb, ChannelTarget, DeformedMesh, Instance, LocalTransform, Mesh, Pose, PosedCamera, PosedInstance,
-    PosedLight, Scene, Skin,
+    Aabb, ChannelTarget, DeformedMesh, Edits, Instance, Light, LocalTransform, Mesh, Placement, Pose,
+    PosedCamera, PosedInstance, PosedLight, Scene, Skin,
 };
 
 /// Default ray length as a part of the scene's diagonal.
@@ -14,7 +14,7 @@ const RADIUS_OF_DIAGONAL: f32 = 0.02;
 
 /// What animates one node at one time.
 #[derive(Clone, Default)]
-struct Animated {
+pub(crate) struct Animated {
     translation: Option<Vec3>,
     rotation: Option<Quat>,
     scale: Option<Vec3>,
@@ -22,16 +22,43 @@ struct Animated {
 }
 
 impl Scene {
-    /// Everything that moves, at `time_s` seconds. The active animation plays in a loop. A function of the scene
-    /// and the time alone, the same on every machine.
+    /// Everything that moves, at `time_s` seconds, of the scene as it was loaded. The active animation plays in a loop. A
+    /// function of the scene and the time alone, the same on every machine.
     pub fn pose(&self, time_s: f64) -> Pose {
-        self.pose_with(time_s, true)
+        self.pose_edited(time_s, &Edits::new(self))
+    }
+
+    /// As [`Scene::pose`], of a scene that viewers have changed: a function of scene, time and edits. What the edits say of
+    /// things that the scene does not have is left out ([`Edits::check`]).
+    pub fn pose_edited(&self, time_s: f64, edits: &Edits) -> Pose {
+        self.pose_with(time_s, edits, true)
     }
 
     /// As [`Scene::pose`], but no vertex is visited: `deformed` is `None` throughout. For those who skin and morph
     /// by themselves, from `world_from_node` (see [`Scene::world_from_bind`]) and `morph_weights`.
     pub fn pose_undeformed(&self, time_s: f64) -> Pose {
-        self.pose_with(time_s, false)
+        self.pose_undeformed_edited(time_s, &Edits::new(self))
+    }
+
+    /// As [`Scene::pose_undeformed`], of a scene that viewers have changed.
+    pub fn pose_undeformed_edited(&self, time_s: f64, edits: &Edits) -> Pose {
+        self.pose_with(time_s, edits, false)
+    }
+
+    /// Where a node stands at `time_s` seconds, for who wants to move it from there; `None` if there is no such node, or its
+    /// transform cannot be taken apart. A matrix that shears gives the nearest thing without shear.
+    pub fn placement(&self, node: u32, time_s: f64, edits: &Edits) -> Option<Placement> {
+        let index = node as usize;
+        self.nodes.get(index)?;
+        let local = self.local_transform(index, self.animate(time_s).get(index), edits);
+        let (scale, rotation, translation) = match local {
+            LocalTransform::Trs { translation, rotation, scale } => (scale, rotation, translation),
+            LocalTransform::Matrix(matrix) => Affine3A::from_mat4(matrix).to_scale_rotation_translation(),
+        };
+        (scale.is_finite() && rotation.is_finite() && translation.is_finite()).then(|| {
+            let (translation, rotation, scale) = (translation.into(), rotation.into(), scale.into());
+            Placement { translation, rotation, scale }.normalized()
+        })
     }
 
     /// Where each joint of a skin brings the mesh at bind time, in the world.
@@ -39,9 +66,9 @@ impl Scene {
         bind_transforms(&self.skins[skin], &pose.world_from_node)
     }
 
-    fn pose_with(&self, time_s: f64, deform: bool) -> Pose {
+    fn pose_with(&self, time_s: f64, edits: &Edits, deform: bool) -> Pose {
         let animated = self.animate(time_s);
-        let mut world_from_node = self.node_transforms(&animated);
+        let mut world_from_node = self.node_transforms(&animated, edits);
         for world in &mut world_from_node {
             // Scales that multiply beyond all bounds: nothing sensible can be drawn, but nothing must break either.
             if !world.is_finite() {
@@ -50,9 +77,12 @@ impl Scene {
         }
         let morph_weights: Vec<Vec<f32>> =
             self.instances.iter().map(|instance| self.morph_weights(instance, &animated)).collect();
-        let posed = self.instances.iter().zip(&morph_weights);
+        let posed = (0..).zip(self.instances.iter().zip(&morph_weights));
         let instances = posed
-            .map(|(instance, weights)| self.pose_instance(instance, &world_from_node, weights, deform))
+            .map(|(i, (instance, weights))| match edits.removed.contains(&i) {
+                true => PosedInstance::REMOVED,
+                false => self.pose_instance(instance, &world_from_node, weights, deform),
+            })
             .collect();
         let mut lights = Vec::new();
         let mut cameras = Vec::new();
@@ -60,7 +90,11 @@ impl Scene {
             if let Some(light) = node.light {
                 let direction_world =
                     Vec3::from(world.matrix3 * Vec3A::NEG_Z).try_normalize().unwrap_or(Vec3::NEG_Z);
-                lights.push(PosedLight { light, position_world: world.translation.into(), direction_world });
+                let Light { color, intensity, .. } = self.lights[light as usize];
+                let edited = edits.lights.get(&light).map(|e| (Vec3::from_array(e.color), e.intensity));
+                let (color, intensity) = edited.unwrap_or((color, intensity));
+                let position_world = world.translation.into();
+                lights.push(PosedLight { light, position_world, direction_world, color, intensity });
             }
             if let Some(camera) = node.camera {
                 let projection = self.cameras[camera as usize].projection;
@@ -79,8 +113,11 @@ impl Scene {
         }
     }
 
-    /// The tight world box of one instance. Visits every vertex.
+    /// The tight world box of one instance, empty if it is not there. Visits every vertex.
     pub fn instance_bounds_world(&self, pose: &Pose, instance: usize) -> Aabb {
+        if !pose.instances[instance].is_there() {
+            return Aabb::EMPTY;
+        }
         let world_from_mesh = &pose.instances[instance].world_from_mesh;
         let positions = self.vertex_positions(pose, instance);
         Aabb::from_points(positions.iter().map(|p| world_from_mesh.transform_point3(*p)))
@@ -103,7 +140,7 @@ impl Scene {
     }
 
     /// The active animation's values, one a node; empty without one.
-    fn animate(&self, time_s: f64) -> Vec<Animated> {
+    pub(crate) fn animate(&self, time_s: f64) -> Vec<Animated> {
         let Some(animation) = self.active_animation.and_then(|i| self.animations.get(i as usize)) else {
             return Vec::new();
         };
@@ -123,17 +160,24 @@ impl Scene {
         animated
     }
 
-    fn node_transforms(&self, animated: &[Animated]) -> Vec<Affine3A> {
+    /// A node's own transform: the edits', else the animation's, else the file's.
+    fn local_transform(&self, index: usize, animated: Option<&Animated>, edits: &Edits) -> LocalTransform {
+        if let Some(placement) = u32::try_from(index).ok().and_then(|node| edits.placed.get(&node)) {
+            return placement.local();
+        }
+        let mut local = self.nodes[index].local;
+        if let (LocalTransform::Trs { translation, rotation, scale }, Some(values)) = (&mut local, animated) {
+            *translation = values.translation.unwrap_or(*translation);
+            *rotation = values.rotation.unwrap_or(*rotation);
+            *scale = values.scale.unwrap_or(*scale);
+        }
+        local
+    }
+
+    pub(crate) fn node_transforms(&self, animated: &[Animated], edits: &Edits) -> Vec<Affine3A> {
         let mut world_from_node: Vec<Affine3A> = Vec::with_capacity(self.nodes.len());
         for (i, node) in self.nodes.iter().enumerate() {
-            let mut local = node.local;
-            if let (LocalTransform::Trs { translation, rotation, scale }, Some(values)) =
-                (&mut local, animated.get(i))
-            {
-                *translation = values.translation.unwrap_or(*translation);
-                *rotation = values.rotation.unwrap_or(*rotation);
-                *scale = values.scale.unwrap_or(*scale);
-            }
+            let local = self.local_transform(i, animated.get(i), edits);
             let parent_from_node = local.parent_from_node();
             world_from_node.push(match node.parent {
                 Some(parent) => world_from_node[parent as usize] * parent_from_node,
@@ -145,7 +189,9 @@ impl Scene {
 
     /// Whether every node's place at `time_s` can be computed without overflow; the first that cannot otherwise.
     pub(crate) fn first_unplaceable_node(&self, time_s: f64) -> Option<usize> {
-        self.node_transforms(&self.animate(time_s)).iter().position(|world| !world.is_finite())
+        self.node_transforms(&self.animate(time_s), &Edits::new(self))
+            .iter()
+            .position(|world| !world.is_finite())
     }
 
     /// Weights of an instance's morph targets: the animation's, else the node's, else the mesh's.

@@ -104,6 +104,8 @@ pub struct Instance {
     /// For rigid and morphed instances it is the linear part of the node's world transform at time 0; for skinned
     /// ones a uniform scale, the square root of (surface area posed at time 0 ÷ area of the bind pose). It never changes.
     pub rest_from_mesh: Mat3,
+    /// Not there until somebody wants another of its kind ([`Scene::add_spares`]); files have none.
+    pub spare: bool,
 }
 
 /// The joints of a skinned mesh.

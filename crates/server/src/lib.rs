@@ -11,7 +11,7 @@ mod streams;
 use std::sync::Arc;
 
 use dapple_scene::glam::Vec3;
-use dapple_scene::{Pose, Scene};
+use dapple_scene::{Edits, Pose, Scene};
 use dapple_store::points::{LayoutError, PointStore};
 use dapple_stream::{Budget, Frame, Precision, Publisher, PublisherConfig};
 use dapple_trace::Tracer;
@@ -149,6 +149,8 @@ pub struct StepReport {
 #[derive(Clone)]
 pub struct Server {
     scene: Arc<Scene>,
+    /// What the next step's pose goes by.
+    edits: Edits,
     tracer: Tracer,
     updater: Updater,
     /// What [`Server::step_at`] publishes, and what was added to it.
@@ -217,7 +219,8 @@ impl Server {
         publisher.publish(updater.store());
         let streams = vec![Stream { publisher, budget: config.bits_per_s.map(Budget::new) }];
         let tolerance = config.publish.precision.tolerance;
-        Ok(Server { scene, tracer, updater, streams, tolerance, dropped_inside, population: None })
+        let (edits, population) = (Edits::new(&scene), None);
+        Ok(Server { scene, edits, tracer, updater, streams, tolerance, dropped_inside, population })
     }
 
     /// Brings the scene to `now_s` (seconds) and publishes what changed. Time may run in any direction. Takes as many rays
@@ -240,7 +243,7 @@ impl Server {
         sent_s: f64,
         input: &StepInput<'_>,
     ) -> Result<StepReport, ServerError> {
-        let pose = self.scene.pose(now_s);
+        let pose = self.scene.pose_edited(now_s, &self.edits);
         self.tracer.update(&self.scene, &pose);
         let (mut spawned, mut evicted) = (Vec::new(), 0);
         if let Some(population) = &mut self.population {
@@ -268,6 +271,17 @@ impl Server {
             spawned: spawned.len() as u32,
             evicted,
         })
+    }
+
+    /// From the next step on the scene is changed like this. The edits must be ones that [`Edits::check`] lets pass, and every client
+    /// must draw with the same. What becomes visible or dark by them is traced as if it had moved by itself.
+    pub fn set_edits(&mut self, edits: Edits) {
+        self.edits = edits;
+    }
+
+    /// What viewers have changed; as at first ([`Edits::new`]) until [`Server::set_edits`].
+    pub fn edits(&self) -> &Edits {
+        &self.edits
     }
 
     /// Points that a budget of bits did not reach.

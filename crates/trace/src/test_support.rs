@@ -26,6 +26,7 @@ pub(crate) fn scene(meshes: Vec<Mesh>, instances: &[(u32, Affine3A)]) -> (Scene,
                 casts: true,
                 receives: true,
                 rest_from_mesh: Mat3::from(map.matrix3),
+                spare: false,
             })
             .collect(),
         ..Scene::default()

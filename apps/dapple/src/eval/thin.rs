@@ -82,6 +82,7 @@ fn add(scene: &mut Scene, mut mesh: Mesh) {
         casts: true,
         receives: true,
         rest_from_mesh: Mat3::IDENTITY,
+        spare: false,
     });
     scene.meshes.push(mesh);
 }

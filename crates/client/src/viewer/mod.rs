@@ -20,7 +20,7 @@ use dapple_gpu::{Gpu, wgpu};
 use dapple_render::forward::{
     Forward, FrameInputs, GpuPoints, GpuScene, GpuSceneOptions, LookupId, Rect, Transparency, View, ViewKind,
 };
-use dapple_scene::{Pose, PosedCamera, Scene};
+use dapple_scene::{Edits, Pose, PosedCamera, Scene};
 use dapple_store::points::PointStore;
 use dapple_stream::{Applied, ReceiveError, Subscriber};
 
@@ -32,6 +32,7 @@ use paper::PaperLookup;
 /// One viewer's copy of the light on a graphics card, and the passes that draw with it.
 pub struct Viewer {
     scene: Arc<Scene>,
+    edits: Edits,
     config: ViewerConfig,
     light: Light,
     gpu_scene: GpuScene,
@@ -71,6 +72,7 @@ impl Viewer {
         )?;
         Ok(Viewer {
             light: Light::new(scene.clone(), subscriber),
+            edits: Edits::new(&scene),
             scene,
             gpu_scene,
             forward,
@@ -87,6 +89,23 @@ impl Viewer {
     /// How materials with blended alpha are drawn; cutouts are what the processor's pictures have.
     pub fn set_transparency(&mut self, transparency: Transparency) {
         self.transparency = transparency;
+    }
+
+    /// Shows the scene changed like this from the next picture on, as the server has it. The edits must be ones that
+    /// [`Edits::check`] lets pass.
+    pub fn set_edits(&mut self, edits: &Edits) {
+        if self.edits != *edits {
+            self.edits.clone_from(edits);
+            // Points are to be placed anew even if time stands still.
+            if let Some(points) = &mut self.points {
+                points.placed = None;
+            }
+        }
+    }
+
+    /// What is shown changed; as at first ([`Edits::new`]) until [`Viewer::set_edits`].
+    pub fn edits(&self) -> &Edits {
+        &self.edits
     }
 
     /// Takes one frame off the wire, which came at `now_s` (seconds on the caller's clock, as in [`Viewer::draw`]).
@@ -158,9 +177,9 @@ impl Viewer {
         let wants_points = options.view == DebugView::Points;
         // Only where points are shown must the processor know where deforming meshes are.
         let pose = if wants_points {
-            self.scene.pose(scene_time_s)
+            self.scene.pose_edited(scene_time_s, &self.edits)
         } else {
-            self.scene.pose_undeformed(scene_time_s)
+            self.scene.pose_undeformed_edited(scene_time_s, &self.edits)
         };
         if wants_points {
             self.place_points(gpu, &pose);

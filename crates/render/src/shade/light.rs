@@ -42,7 +42,7 @@ impl ActiveLight {
             position_world: posed.position_world,
             direction_world: posed.direction_world,
             throws_shadow,
-            intensity: light.color * light.intensity,
+            intensity: posed.color * posed.intensity,
             range: light.range,
             cone,
         }
@@ -92,7 +92,8 @@ pub(crate) fn active_lights(scene: &Scene, pose: &Pose, params: &ShadeParams) ->
             kind: LightKind::Directional,
         };
         let direction_world = direction.normalize();
-        let posed = PosedLight { light: 0, position_world: Vec3::ZERO, direction_world };
+        let posed =
+            PosedLight { light: 0, position_world: Vec3::ZERO, direction_world, color: Vec3::ONE, intensity };
         ActiveLight::new(&light, &posed, throws_shadow)
     };
     // Lux such that white faces reach a radiance of 0.7 and 0.05.
@@ -102,7 +103,8 @@ pub(crate) fn active_lights(scene: &Scene, pose: &Pose, params: &ShadeParams) ->
     ]
 }
 
-/// Irradiance (lux per channel) that one placed light gives a surface with a unit normal, without shadows.
+/// Irradiance (lux per channel) that one placed light gives a surface with a unit normal, without shadows. Colour and intensity are
+/// those of the pose.
 ///
 /// For a point light of intensity *I* at height *h* over a plane and distance *x* aside it is *I h* / (*h*² + *x*²)^(3/2).
 pub fn light_irradiance(light: &Light, posed: &PosedLight, position_world: Vec3, normal_world: Vec3) -> Vec3 {

@@ -58,7 +58,13 @@ fn a_point_light_over_a_plane_follows_the_closed_form() {
 
 #[test]
 fn lights_fade_as_the_extension_says() {
-    let posed = PosedLight { light: 0, position_world: Vec3::Y * 2.0, direction_world: Vec3::NEG_Y };
+    let posed = PosedLight {
+        light: 0,
+        position_world: Vec3::Y * 2.0,
+        direction_world: Vec3::NEG_Y,
+        color: Vec3::ONE,
+        intensity: 8.0,
+    };
     let light = |kind, range| Light { name: String::new(), color: Vec3::ONE, intensity: 8.0, range, kind };
     let at = |light: &Light, x: f32| light_irradiance(light, &posed, Vec3::new(x, 0.0, 0.0), Vec3::Y).x;
     assert_eq!(at(&light(LightKind::Point, None), 0.0), 2.0);

@@ -73,6 +73,7 @@ pub(super) fn finish(context: &Context<'_>, draft: Draft) -> Result<(Scene, Vec<
             casts: placement.casts,
             receives: placement.receives,
             rest_from_mesh: Mat3::IDENTITY,
+            spare: false,
         });
     }
     set_rest_scale(context, &mut scene, &label_of)?;

@@ -166,6 +166,7 @@ mod tests {
             casts: true,
             receives: true,
             rest_from_mesh: Mat3::IDENTITY,
+            spare: false,
         };
         Scene {
             nodes: vec![Node::default()],

@@ -26,8 +26,15 @@ fn triangle() -> Mesh {
 }
 
 fn scene(nodes: Vec<Node>, mesh: Mesh, node: u32, skin: Option<u32>) -> Scene {
-    let instance =
-        Instance { node, mesh: 0, skin, casts: true, receives: true, rest_from_mesh: Mat3::IDENTITY };
+    let instance = Instance {
+        node,
+        mesh: 0,
+        skin,
+        casts: true,
+        receives: true,
+        rest_from_mesh: Mat3::IDENTITY,
+        spare: false,
+    };
     Scene {
         nodes,
         meshes: vec![mesh],

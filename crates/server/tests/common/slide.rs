@@ -25,6 +25,7 @@ pub(crate) fn scene() -> Arc<Scene> {
         casts: true,
         receives: true,
         rest_from_mesh: Mat3::IDENTITY,
+        spare: false,
     };
     Arc::new(Scene {
         nodes: vec![Node::default(), Node::default()],

@@ -60,6 +60,7 @@ impl Triangles {
             casts: true,
             receives: true,
             rest_from_mesh: Mat3::IDENTITY,
+            spare: false,
         };
         let posed = PosedInstance { world_from_mesh: Affine3A::IDENTITY, deformed: None };
         let scene = Scene {

@@ -68,6 +68,7 @@ pub(super) fn bent_and_swollen() -> Scene {
         casts: true,
         receives: true,
         rest_from_mesh: Mat3::IDENTITY,
+        spare: false,
     };
     let inverse = |y: f32| Affine3A::from_translation(Vec3::new(0.0, -y, 0.0));
     let channel = |node, target, values: &[f32]| Channel {

@@ -34,6 +34,7 @@ fn scene(walled: bool, wall_casts: bool) -> Scene {
             casts,
             receives: index == 0,
             rest_from_mesh: dapple_scene::glam::Mat3::IDENTITY,
+            spare: false,
         });
     }
     if !walled {
