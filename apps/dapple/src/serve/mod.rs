@@ -21,7 +21,6 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow, bail};
-use dapple_server::ServerConfig;
 use dapple_session::Role;
 use dapple_session::host::{Access, Host, HostConfig};
 use dapple_stream::PublisherConfig;

@@ -51,7 +51,9 @@ pub(crate) fn router(hub: SharedHub, asset: Arc<Asset>, page: Option<PathBuf>) -
         header::ACCESS_CONTROL_ALLOW_ORIGIN,
         HeaderValue::from_static("*"),
     );
-    let router = Router::new()
+    let router = Router::new();
+    let router = if page.is_none() { router.route("/", get(no_page_answer)) } else { router };
+    let router = router
         .route(&format!("/{FILE_NAME}"), get(viewer_json_answer))
         .route(&format!("/{SCENE_FOLDER}/{{name}}"), get(scene_answer))
         .route(&format!("/{LIVE_PATH}"), get(live_answer))
@@ -71,7 +73,7 @@ pub(crate) fn router(hub: SharedHub, asset: Arc<Asset>, page: Option<PathBuf>) -
                 .layer(CompressionLayer::new().gzip(true));
             router.fallback_service(files)
         }
-        None => router.route("/", get(no_page_answer)),
+        None => router,
     }
 }
 
