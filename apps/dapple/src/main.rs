@@ -13,6 +13,7 @@ mod inspect;
 mod judge;
 mod light;
 mod listen;
+mod live;
 mod page;
 mod picture;
 mod progress;

@@ -41,7 +41,7 @@ pub(crate) fn router(hub: SharedHub, asset: Arc<Asset>, page: Option<PathBuf>) -
         scene: format!("{SCENE_FOLDER}/{}", asset.name),
         stream: None,
         live: Some(LIVE_PATH.to_owned()),
-        animation: asset.scene.active_animation,
+        animation: asset.scene.active_animation.filter(|index| *index != 0),
         spares: asset.spares.iter().map(|spare| Spares { instance: spare.instance, count: spare.count }).collect(),
     };
     let viewer_json = serde_json::to_string_pretty(&json).expect("it is made of names and numbers").into();

@@ -9,6 +9,7 @@ mod paint;
 mod picture;
 mod quality;
 mod record_path;
+mod remote;
 mod retries;
 mod screen;
 mod session;
@@ -25,8 +26,10 @@ use dapple_client::viewer::DrawOptions;
 use crate::args::{LightArgs, ViewArgs};
 use crate::source;
 
+use dapple_session::GuestConfig;
 use feed::{Feed, Player};
 use quality::Quality;
+use remote::Remote;
 use session::Outputs;
 use show::{Opening, start_server};
 use steer::Steering;
@@ -85,9 +88,15 @@ fn open(args: &ViewArgs) -> Result<Opening> {
         Some(url) => {
             let fetched = fetch::fetch(url)?;
             let scene = Arc::new(fetched.scene);
-            let feed = match fetched.stream {
-                Some(pieces) => Feed::Recorded(Player::incoming(pieces, &scene)),
-                None => Feed::None,
+            let feed = match (fetched.live, fetched.stream) {
+                (Some(address), _) => {
+                    let bits_per_s = args.step.budget.map(|rate| rate.0);
+                    let seed = u64::from(std::process::id());
+                    let config = GuestConfig { token: args.token.clone(), bits_per_s, seed, ..GuestConfig::default() };
+                    Feed::Remote(Remote::join(address, &scene, config)?)
+                }
+                (None, Some(pieces)) => Feed::Recorded(Player::incoming(pieces, &scene)),
+                (None, None) => Feed::None,
             };
             (scene, fetched.title, feed)
         }

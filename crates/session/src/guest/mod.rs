@@ -206,7 +206,7 @@ impl Guest {
         };
         Ok(match self.assembly.push(head, piece, most) {
             Assembled::Part => News::Nothing,
-            Assembled::Gap => {
+            Assembled::Never => {
                 self.look.lost += 1;
                 News::Nothing
             }

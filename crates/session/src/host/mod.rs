@@ -334,7 +334,7 @@ impl Host {
             FromViewer::Event { number, event } => {
                 // What was heard before needs no answer but that; what does not follow comes again.
                 if number != viewer.events_taken.wrapping_add(1) {
-                    viewer.answer_events();
+                    viewer.answer_events_again();
                     return Ok(());
                 }
                 let refused = if viewer.role < Role::Interact {
