@@ -1,6 +1,7 @@
 //! Command-line arguments.
 
 pub(crate) mod bake;
+mod bench;
 mod bit_rate;
 mod eval;
 mod serve;
@@ -15,6 +16,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
 
 pub(crate) use bake::BakeArgs;
+pub(crate) use bench::{Bench, BenchArgs, JoinArgs, ServedArgs, SoakArgs, ViewersArgs};
 pub(crate) use bit_rate::BitRate;
 pub(crate) use eval::{EvalArgs, Options, ScenesArgs};
 pub(crate) use serve::{LogFormat, Named, ServeArgs};
@@ -62,6 +64,8 @@ pub(crate) enum Command {
     /// Light a scene for any number of viewers, live: browsers and `dapple view --url`.
     #[command(after_help = serve::SERVE_EXAMPLES)]
     Serve(Box<ServeArgs>),
+    /// Measure a live server: viewers, joining, and a long run.
+    Bench(BenchArgs),
 }
 
 const RENDER_EXAMPLES: &str = "\

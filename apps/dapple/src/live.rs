@@ -59,10 +59,7 @@ pub(crate) async fn keep(
 ) {
     loop {
         state.send_replace(LinkState::Connecting);
-        let ended = tokio::select! {
-            ended = converse(address, shared, state, &mut on_news) => ended,
-            _ = stop.wait_for(|stop| *stop) => return,
-        };
+        let ended = converse(address, shared, state, &mut stop, &mut on_news).await;
         let wait_us = shared.lock().disconnected();
         let reason = match ended {
             Ended::Broken(reason) => reason,
@@ -70,30 +67,43 @@ pub(crate) async fn keep(
                 state.send_replace(LinkState::Ended(reason));
                 return;
             }
+            Ended::Stopped => return,
         };
         let wait = Duration::from_micros(wait_us);
         tracing::info!("{reason}; trying again in {:.1} s", wait.as_secs_f64());
         state.send_replace(LinkState::Waiting(reason, wait.as_secs_f64()));
         tokio::select! {
             () = tokio::time::sleep(wait) => {}
-            _ = stop.wait_for(|stop| *stop) => return,
+            () = told(&mut stop) => return,
         }
     }
+}
+
+/// Waits until told to stop, or until nobody can say so any more.
+async fn told(stop: &mut watch::Receiver<bool>) {
+    let _ = stop.wait_for(|stop| *stop).await;
 }
 
 /// How a conversation ended.
 enum Ended {
     Broken(String),
     Refused(String),
+    /// This end was told to stop, and has said so.
+    Stopped,
 }
 
 async fn converse(
     address: &str,
     shared: &SharedGuest,
     state: &watch::Sender<LinkState>,
+    stop: &mut watch::Receiver<bool>,
     on_news: &mut (impl FnMut(&mut Guest, News) + Send),
 ) -> Ended {
-    let (mut out, mut inbound) = match ws::connect(address, MAX_MESSAGE_BYTES).await {
+    let connected = tokio::select! {
+        connected = ws::connect(address, MAX_MESSAGE_BYTES) => connected,
+        () = told(stop) => return Ended::Stopped,
+    };
+    let (mut out, mut inbound) = match connected {
         Ok(halves) => halves,
         Err(error) => return Ended::Broken(error.to_string()),
     };
@@ -111,6 +121,12 @@ async fn converse(
         }
         let message = tokio::select! {
             message = inbound.receive() => message,
+            () = told(stop) => {
+                // It is no loss if the host does not hear it.
+                let _ = out.send_text(Guest::bye().into()).await;
+                out.close().await;
+                return Ended::Stopped;
+            }
             _ = words.tick() => {
                 if heard.elapsed() > SILENCE {
                     return Ended::Broken(format!("the host has said nothing for {} s", SILENCE.as_secs()));

@@ -151,7 +151,8 @@ mod tests {
     fn frames_of_every_length_come_through() {
         for length in [0, 1, CHUNK_BYTES - 1, CHUNK_BYTES, CHUNK_BYTES + 1, 3 * CHUNK_BYTES] {
             let frame: Vec<u8> = (0..length).map(|i| (i * 7 % 251) as u8).collect();
-            let head = LightHead { stamp_us: 5, made_us: 9, scene_us: 1 << 40, state: 3, total: 0, offset: 0 };
+            let head =
+                LightHead { stamp_us: 5, made_us: 9, scene_us: 1 << 40, state: 3, total: 0, offset: 0 };
             let messages = head.messages(&frame);
             assert!(messages.iter().all(|message| message.len() <= MAX_LIGHT_MESSAGE_BYTES));
             let mut assembly = Assembly::default();

@@ -31,6 +31,8 @@ pub(crate) enum Bench {
     /// What a viewer costs a live server, and how old its light is.
     #[command(after_help = VIEWERS_EXAMPLES)]
     Viewers(ViewersArgs),
+    /// How long a viewer waits for the first light over a link of a given width and delay, and what that takes.
+    Join(JoinArgs),
     /// Viewers that join, leave, stall, break off and move things for a long while; the light must come to all, and memory stay flat.
     #[command(after_help = SOAK_EXAMPLES)]
     Soak(SoakArgs),
@@ -75,6 +77,21 @@ pub(crate) struct ViewersArgs {
     /// Also write the figures as JSON.
     #[arg(short, long, value_name = "FILE.json")]
     pub(crate) output: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct JoinArgs {
+    #[command(flatten)]
+    pub(crate) served: ServedArgs,
+    /// Bits a second that the link carries towards the viewer.
+    #[arg(long, value_name = "BITS/S", default_value = "10M")]
+    pub(crate) link: BitRate,
+    /// Delay of the link, there and back, milliseconds.
+    #[arg(long, value_name = "MS", default_value_t = 50.0)]
+    pub(crate) delay: f64,
+    /// How often.
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    pub(crate) times: u32,
 }
 
 #[derive(Debug, Clone, Args)]

@@ -42,7 +42,13 @@ pub(crate) struct ServeArgs {
     pub(crate) record: Option<PathBuf>,
     /// A secret and what it allows: view=SECRET or interact=SECRET. Without any, everyone may do everything; with one for interact alone, the
     /// others may look.
-    #[arg(long, value_name = "ROLE=SECRET", env = "DAPPLE_TOKENS", value_delimiter = ' ', hide_env_values = true)]
+    #[arg(
+        long,
+        value_name = "ROLE=SECRET",
+        env = "DAPPLE_TOKENS",
+        value_delimiter = ' ',
+        hide_env_values = true
+    )]
     pub(crate) token: Vec<Token>,
     /// Most viewers at a time.
     #[arg(long, value_name = "N", default_value_t = 1000)]

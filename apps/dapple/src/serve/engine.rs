@@ -152,7 +152,12 @@ impl Engine {
         Ok(())
     }
 
-    fn record(&mut self, server: &mut Server, tick: &Tick, frame: Option<&dapple_stream::Frame>) -> Result<()> {
+    fn record(
+        &mut self,
+        server: &mut Server,
+        tick: &Tick,
+        frame: Option<&dapple_stream::Frame>,
+    ) -> Result<()> {
         let Some(recording) = &mut self.recording else { return Ok(()) };
         let recorded = if recording.wants_snapshot() {
             let joined = server.join()?.context("a server publishes as it starts")?;

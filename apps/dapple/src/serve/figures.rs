@@ -93,8 +93,7 @@ impl Figures {
     }
 
     fn percentiles(&self) -> [f64; 3] {
-        let mut ages_us =
-            self.newest_ages.lock().unwrap_or_else(PoisonError::into_inner).ages_us.clone();
+        let mut ages_us = self.newest_ages.lock().unwrap_or_else(PoisonError::into_inner).ages_us.clone();
         ages_us.sort_unstable();
         [0.5, 0.95, 0.99].map(|part| {
             let at = (ages_us.len() as f64 * part) as usize;
@@ -134,7 +133,11 @@ impl Figures {
             ("viewers", "Viewers connected", i64::from(host.viewers)),
             ("points", "Points that are lit", self.points.load(Ordering::Relaxed)),
             ("points_waiting", "Points that wait for rays", self.waiting.load(Ordering::Relaxed)),
-            ("ray_budget", "Rays that an update may take, 0 for no limit", self.ray_budget.load(Ordering::Relaxed)),
+            (
+                "ray_budget",
+                "Rays that an update may take, 0 for no limit",
+                self.ray_budget.load(Ordering::Relaxed),
+            ),
         ];
         for (name, help, value) in gauges {
             registry.register(name, help, ConstGauge::new(value));

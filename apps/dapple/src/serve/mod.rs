@@ -35,6 +35,7 @@ use crate::page::built_page;
 use crate::progress::Bar;
 use asset::Asset;
 use engine::Engine;
+pub(crate) use figures::process_of;
 use hub::{Hub, Phase};
 use ration::Ration;
 use recording::LiveRecording;
@@ -114,7 +115,9 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     let url = url_of(address, if is_secure { "https" } else { "http" });
     announce(&url, &asset, has_page, is_secure);
     if !address.ip().is_loopback() && access.open_role() == Some(Role::Interact) {
-        tracing::warn!("whoever reaches this address may change the scene: --token interact=SECRET keeps that to some");
+        tracing::warn!(
+            "whoever reaches this address may change the scene: --token interact=SECRET keeps that to some"
+        );
     }
     let ended = wait(&runtime, &hub);
 

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use axum::{Extension, Router};
 use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::{Path, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::get;
+use axum::{Extension, Router};
 use dapple_session::MAX_FROM_VIEWER_BYTES;
 use serde_json::json;
 use tower_http::compression::CompressionLayer;
@@ -42,7 +42,11 @@ pub(crate) fn router(hub: SharedHub, asset: Arc<Asset>, page: Option<PathBuf>) -
         stream: None,
         live: Some(LIVE_PATH.to_owned()),
         animation: asset.scene.active_animation.filter(|index| *index != 0),
-        spares: asset.spares.iter().map(|spare| Spares { instance: spare.instance, count: spare.count }).collect(),
+        spares: asset
+            .spares
+            .iter()
+            .map(|spare| Spares { instance: spare.instance, count: spare.count })
+            .collect(),
     };
     let viewer_json = serde_json::to_string_pretty(&json).expect("it is made of names and numbers").into();
     let shared = Shared { hub, asset, viewer_json };
@@ -96,10 +100,7 @@ async fn scene_answer(State(shared): State<Shared>, Path(name): Path<String>, as
     let mut headers = HeaderMap::new();
     headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("model/gltf-binary"));
     headers.insert(header::VARY, HeaderValue::from_static("accept-encoding"));
-    headers.insert(
-        header::CACHE_CONTROL,
-        HeaderValue::from_static("public, max-age=31536000, immutable"),
-    );
+    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("public, max-age=31536000, immutable"));
     match asset.gzip.clone().filter(|_| takes_gzip) {
         Some(packed) => {
             headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));

@@ -11,9 +11,9 @@ use dapple_stream::{FrameHeader, Limits, Recording, Replay};
 use super::fetch::Piece;
 use super::live::{Live, Start};
 use super::remote::Remote;
-use crate::live::LinkState;
 use crate::inspect::MAX_RECORDING_BYTES;
 use crate::light::microseconds;
+use crate::live::LinkState;
 use crate::source::read_limited;
 
 /// What lights the scene.

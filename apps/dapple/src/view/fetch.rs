@@ -54,8 +54,11 @@ pub(super) fn fetch(url: &str) -> Result<Fetched> {
         }
         scene.set_active_animation(Some(animation));
     }
-    let spares: Vec<Spare> =
-        json.spares.iter().map(|Spares { instance, count }| Spare { instance: *instance, count: *count }).collect();
+    let spares: Vec<Spare> = json
+        .spares
+        .iter()
+        .map(|Spares { instance, count }| Spare { instance: *instance, count: *count })
+        .collect();
     scene.add_spares(&spares).with_context(|| format!("{json_address}: spare instances"))?;
     let live = match &json.live {
         Some(live) => Some(resolve(url, live)?.replacen("http://", "ws://", 1)),

@@ -37,6 +37,12 @@ use steer::Steering;
 /// Updates a second where none are given.
 const DEFAULT_HZ: f64 = 15.0;
 
+/// The scene that a folder's viewer.json names, and where its live session is.
+pub(crate) fn fetch_scene(url: &str) -> Result<(dapple_scene::Scene, Option<String>)> {
+    let fetched = fetch::fetch(url)?;
+    Ok((fetched.scene, fetched.live))
+}
+
 /// Shows what the arguments name.
 pub(crate) fn run(args: &ViewArgs) -> Result<()> {
     check(args)?;
@@ -92,7 +98,8 @@ fn open(args: &ViewArgs) -> Result<Opening> {
                 (Some(address), _) => {
                     let bits_per_s = args.step.budget.map(|rate| rate.0);
                     let seed = u64::from(std::process::id());
-                    let config = GuestConfig { token: args.token.clone(), bits_per_s, seed, ..GuestConfig::default() };
+                    let config =
+                        GuestConfig { token: args.token.clone(), bits_per_s, seed, ..GuestConfig::default() };
                     Feed::Remote(Remote::join(address, &scene, config)?)
                 }
                 (None, Some(pieces)) => Feed::Recorded(Player::incoming(pieces, &scene)),

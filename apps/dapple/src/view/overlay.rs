@@ -5,9 +5,9 @@ use egui::{Align2, Color32, Context, RichText, Slider, Ui, vec2};
 
 use super::quality::{METHODS, PRESETS, Quality, VIEWS, name_of};
 use super::show::{Figures, Show};
-use dapple_session::Role;
 use crate::args::Preset;
 use crate::live::LinkState;
+use dapple_session::Role;
 
 /// Width of the panel, in the overlay's units.
 const PANEL_WIDTH: f32 = 240.0;
@@ -110,7 +110,9 @@ impl Overlay {
         let preparing = show.feed.preparing();
         // What stays as it is until something else is shown.
         let broken = match show.feed.remote().map(|remote| remote.state()) {
-            Some(LinkState::Waiting(reason, seconds)) => Some(format!("{reason}; trying again in {seconds:.1} s")),
+            Some(LinkState::Waiting(reason, seconds)) => {
+                Some(format!("{reason}; trying again in {seconds:.1} s"))
+            }
             Some(LinkState::Ended(reason)) => Some(reason),
             _ => None,
         };

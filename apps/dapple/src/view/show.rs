@@ -10,8 +10,8 @@ use dapple_client::viewer::{DrawOptions, LoadProgress, Viewer, ViewerConfig, Vie
 use dapple_gpu::{Gpu, wgpu};
 use dapple_render::shade::ShadeParams;
 use dapple_scene::{KeyedPath, Scene};
-use dapple_session::{Event, Held};
 use dapple_server::ServerConfig;
+use dapple_session::{Event, Held};
 use dapple_stream::PublisherConfig;
 
 use super::feed::{Feed, group_of};

@@ -12,8 +12,8 @@ pub use timing::Latency;
 
 use crate::light::{Assembled, Assembly};
 use crate::{
-    Event, FromHost, FromViewer, Held, Hello, LightHead, Look, LookCamera, MessageError, PROTOCOL, Refusal, Role,
-    SceneClock, Status, Welcome,
+    Event, FromHost, FromViewer, Held, Hello, LightHead, Look, LookCamera, MessageError, PROTOCOL, Refusal,
+    Role, SceneClock, Status, Welcome,
 };
 use backoff::Backoff;
 use pending::Pending;
@@ -87,6 +87,7 @@ pub struct Guest {
     timing: Timing,
     backoff: Backoff,
     status: Status,
+    newest: Option<LightHead>,
     look: Look,
     /// What was said in the last look, and when.
     said: Look,
@@ -112,6 +113,7 @@ impl Guest {
             timing: Timing::default(),
             backoff: Backoff::new(config.seed),
             status: Status::default(),
+            newest: None,
             look: Look::default(),
             said: Look::default(),
             said_us: 0,
@@ -126,7 +128,7 @@ impl Guest {
         (self.look.came, self.look.lost, self.said_us) = (0, 0, now_us);
         // Versions count anew with another host; what was changed stays until the state comes.
         self.version = 0;
-        self.assembly = Assembly::default();
+        (self.assembly, self.newest) = (Assembly::default(), None);
         self.timing.connected();
         self.pending.connected();
     }
@@ -212,6 +214,7 @@ impl Guest {
             }
             Assembled::Whole(head, frame) => {
                 self.timing.light(&head, now_us);
+                self.newest = Some(head);
                 if head.stamp_us >= self.look.heard_us {
                     (self.look.heard_us, self.heard_at_us) = (head.stamp_us, now_us);
                 }
@@ -326,6 +329,11 @@ impl Guest {
     /// Where the time goes between the host's step and this viewer.
     pub fn latency(&self) -> Latency {
         self.timing.latency(&self.status)
+    }
+
+    /// The head of the light that came last; `None` before any came over this connection.
+    pub fn newest(&self) -> Option<&LightHead> {
+        self.newest.as_ref()
     }
 
     /// How the host was when it last said so.

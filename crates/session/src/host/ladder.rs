@@ -93,8 +93,9 @@ impl Rung {
         self.is_wanted = false;
     }
 
-    /// What brings on a viewer that holds this.
-    pub(super) fn step(&mut self, held: Option<Held>) -> Step {
+    /// What brings on a viewer that holds this. Where messages overtake each other (`in_order` false) a snapshot must be the newest, so that nothing
+    /// has to follow it.
+    pub(super) fn step(&mut self, held: Option<Held>, in_order: bool) -> Step {
         let Some(now) = self.now else {
             self.is_wanted = true;
             return Step::Wait;
@@ -113,9 +114,10 @@ impl Rung {
         let usable = self.snapshot.clone().filter(|snapshot| {
             snapshot.held.group == now.group
                 && (snapshot.held == now
-                    || self.position(snapshot.held.epoch).is_some_and(|at| {
-                        self.bytes_from(at) <= snapshot.bytes / 4 + 4096
-                    }))
+                    || in_order
+                        && self
+                            .position(snapshot.held.epoch)
+                            .is_some_and(|at| self.bytes_from(at) <= snapshot.bytes / 4 + 4096))
         });
         match usable {
             Some(snapshot) => Step::Snapshot(snapshot),

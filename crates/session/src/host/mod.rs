@@ -317,8 +317,8 @@ impl Host {
             return Err(Refusal::new(Reason::TooMany, message));
         }
         viewer.last_message_us = now_us;
-        let message = FromViewer::parse(text)
-            .map_err(|error| Refusal::new(Reason::Malformed, error.to_string()))?;
+        let message =
+            FromViewer::parse(text).map_err(|error| Refusal::new(Reason::Malformed, error.to_string()))?;
         match message {
             FromViewer::Hello(_) => {
                 Err(Refusal::new(Reason::Malformed, "a second hello over the same connection"))

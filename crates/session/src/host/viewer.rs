@@ -116,8 +116,7 @@ impl Viewer {
         self.control.clear();
         // What was taken and not dealt with yet still will be.
         self.events_told = self.events_done;
-        self.light =
-            Sent { held, is_reliable, last_us: now_us, progress_us: now_us, ..Sent::default() };
+        self.light = Sent { held, is_reliable, last_us: now_us, progress_us: now_us, ..Sent::default() };
     }
 
     /// Queues a text.
@@ -207,7 +206,7 @@ impl Viewer {
         if light.is_congested(config.window_us, now_us) {
             return None;
         }
-        let entry = match rung.step(light.held) {
+        let entry = match rung.step(light.held, light.is_reliable) {
             Step::UpToDate => {
                 if now_us.saturating_sub(light.last_us) < TICK_EVERY_US {
                     return None;

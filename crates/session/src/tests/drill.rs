@@ -6,7 +6,7 @@ use dapple_scene::{Edit, NoFiles, Placement, Scene, builtin};
 use dapple_store::points::{Change, PackedNormal, PointLayout, PointSet, PointStore};
 use dapple_stream::{Limits, Precision, Publisher, PublisherConfig, Subscriber};
 
-use super::link::{FaultyLink, Faults, Random};
+use super::link::{Faults, FaultyLink, Random};
 use crate::host::{Arrival, Host, HostConfig, Link, Next, Outgoing};
 use crate::{Event, FromViewer, Guest, GuestConfig, GuestError, Held, News, Status};
 
@@ -232,7 +232,9 @@ impl Drill {
         let peer = &self.peers[peer];
         let Some(held) = peer.subscriber.store() else { return Err("it holds nothing".into()) };
         if held.visibility() != published.visibility() {
-            return Err("its light differs".into());
+            let epochs = (peer.subscriber.group(), peer.subscriber.epoch());
+            let newest = (self.publisher.group(), self.publisher.epoch());
+            return Err(format!("its light differs: {epochs:?} of {newest:?}"));
         }
         let (version, clock, edits) = self.host.state();
         if peer.guest.version() != version || peer.guest.edits() != edits || peer.guest.clock() != clock {
@@ -248,7 +250,8 @@ impl Drill {
 impl Peer {
     fn apply(&mut self, frame: &[u8]) {
         let result = self.subscriber.receive(frame);
-        let held = self.subscriber.group().zip(self.subscriber.epoch()).map(|(group, epoch)| Held { group, epoch });
+        let held =
+            self.subscriber.group().zip(self.subscriber.epoch()).map(|(group, epoch)| Held { group, epoch });
         if matches!(result, Ok(dapple_stream::Applied::NewLayout)) {
             self.snapshots += 1;
         }

@@ -40,7 +40,10 @@ fn hellos_that_do_not_fit_are_refused_with_the_reason() {
     assert_eq!(join(&mut host, &Hello { wire: 1, ..good.clone() }, 1), Err(Reason::Version));
     assert_eq!(join(&mut host, &Hello { scene: "00".into(), ..good.clone() }, 1), Err(Reason::Scene));
     assert_eq!(join(&mut host, &Hello { token: None, ..good.clone() }, 1), Err(Reason::Token));
-    assert_eq!(join(&mut host, &Hello { token: Some("S3cret".into()), ..good.clone() }, 1), Err(Reason::Token));
+    assert_eq!(
+        join(&mut host, &Hello { token: Some("S3cret".into()), ..good.clone() }, 1),
+        Err(Reason::Token)
+    );
     let first = join(&mut host, &good, 1).unwrap();
     join(&mut host, &good, 2).unwrap();
     assert_eq!(join(&mut host, &good, 3), Err(Reason::Full));
@@ -88,8 +91,20 @@ fn messages_that_are_none_end_their_connection_alone() {
     let again = FromViewer::Hello(hello(&scene)).to_text();
     let number = r#"{"type":"event","number":-1,"event":{"event":"play"}}"#;
     for (index, text) in [
-        "", "{}", "null", "[]", "\u{0}", r#"{"type":"welcome"}"#, r#"{"type":"look"}"#, &huge, &deep, nan, flat, seek,
-        &again, number,
+        "",
+        "{}",
+        "null",
+        "[]",
+        "\u{0}",
+        r#"{"type":"welcome"}"#,
+        r#"{"type":"look"}"#,
+        &huge,
+        &deep,
+        nan,
+        flat,
+        seek,
+        &again,
+        number,
     ]
     .into_iter()
     .enumerate()
@@ -155,7 +170,8 @@ fn who_says_too_much_or_nothing_is_let_go() {
     let scene = scene();
     let config = HostConfig { messages_per_s: 50, silence_us: 10_000_000, ..HostConfig::default() };
     let mut host = Host::new(scene.clone(), config, 0);
-    let (loud, silent) = (join(&mut host, &hello(&scene), 1).unwrap(), join(&mut host, &hello(&scene), 2).unwrap());
+    let (loud, silent) =
+        (join(&mut host, &hello(&scene), 1).unwrap(), join(&mut host, &hello(&scene), 2).unwrap());
     let look = |number: u64| FromViewer::Look(Look { number, ..Look::default() }).to_text();
     let refused = (0..1000).find_map(|number| host.receive(loud, &look(number), 0).err());
     assert_eq!(refused.unwrap().reason, Reason::TooMany);
@@ -180,7 +196,9 @@ fn one_who_never_reads_holds_nothing_up() {
     let mut refusal = None;
     for number in 1..5000u32 {
         let now_us = u64::from(number) * 100_000;
-        let text = format!(r#"{{"type":"event","number":{number},"event":{{"event":"edit","change":{{"edit":"remove","instance":99999}}}}}}"#);
+        let text = format!(
+            r#"{{"type":"event","number":{number},"event":{{"event":"edit","change":{{"edit":"remove","instance":99999}}}}}}"#
+        );
         if host.receive(link, &text, now_us).is_err() {
             break;
         }
@@ -189,5 +207,8 @@ fn one_who_never_reads_holds_nothing_up() {
             refusal = Some(host.next(link, now_us));
         }
     }
-    assert!(matches!(refusal, Some(Next::Close(ref refusal)) if refusal.reason == Reason::TooMany), "{refusal:?}");
+    assert!(
+        matches!(refusal, Some(Next::Close(ref refusal)) if refusal.reason == Reason::TooMany),
+        "{refusal:?}"
+    );
 }

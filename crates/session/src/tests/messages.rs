@@ -1,10 +1,17 @@
 //! Messages as text.
 
+use std::sync::{Arc, LazyLock};
+
 use proptest::prelude::*;
 
 use crate::{FromHost, FromViewer, Guest, GuestConfig, LightHead, LookCamera};
 use dapple_scene::glam::Vec3;
-use dapple_scene::{NoFiles, PosedCamera, builtin};
+use dapple_scene::{NoFiles, PosedCamera, Scene, builtin};
+
+static SCENE: LazyLock<Arc<Scene>> = LazyLock::new(|| {
+    let glb = builtin::glb("cornell", 0.1).unwrap();
+    Arc::new(dapple_scene::load("cornell.glb", &glb, &NoFiles).unwrap())
+});
 
 #[test]
 fn cameras_come_through() {
@@ -28,9 +35,7 @@ proptest! {
         let _ = LightHead::parse(&bytes);
         let mut led = bytes.clone();
         led.insert(0, b'L');
-        let glb = builtin::glb("cornell", 0.1).unwrap();
-        let scene = dapple_scene::load("cornell.glb", &glb, &NoFiles).unwrap();
-        let mut guest = Guest::new(scene.into(), GuestConfig::default());
+        let mut guest = Guest::new(SCENE.clone(), GuestConfig::default());
         guest.connected(0);
         let _ = guest.receive_bytes(&led, 5);
         let _ = guest.next(10);
