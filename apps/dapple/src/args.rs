@@ -8,6 +8,7 @@ mod serve;
 mod verbs;
 mod view;
 mod watch;
+mod worker;
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -23,6 +24,7 @@ pub(crate) use serve::{LogFormat, Named, ServeArgs};
 pub(crate) use verbs::{CompareArgs, DiffArgs, ErrorMap, EvalVerb, JudgeArgs, PictureFormat, ReferenceArgs};
 pub(crate) use view::{Preset, ViewArgs, ViewKind};
 pub(crate) use watch::{DemoArgs, InspectArgs, LightArgs, RecordArgs};
+pub(crate) use worker::WorkerArgs;
 
 /// Ray-traced ambient visibility, computed once on a server and streamed to thin clients.
 #[derive(Debug, Parser)]
@@ -64,6 +66,9 @@ pub(crate) enum Command {
     /// Light a scene for any number of viewers, live: browsers and `dapple view --url`.
     #[command(after_help = serve::SERVE_EXAMPLES)]
     Serve(Box<ServeArgs>),
+    /// Trace some instances of a scene for a server elsewhere (dapple serve --workers).
+    #[command(after_help = worker::WORKER_EXAMPLES)]
+    Worker(WorkerArgs),
     /// Measure a live server: viewers, joining, and a long run.
     Bench(BenchArgs),
 }

@@ -25,6 +25,7 @@ mod serve;
 mod source;
 mod transport;
 mod view;
+mod worker;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -49,6 +50,7 @@ fn main() -> ExitCode {
 fn log(command: &Command) {
     let (level, format) = match command {
         Command::Serve(args) => ("info", args.log_format),
+        Command::Worker(_) => ("info", LogFormat::Text),
         _ => ("warn", LogFormat::Text),
     };
     let filter = tracing_subscriber::EnvFilter::try_from_env("DAPPLE_LOG")
@@ -84,6 +86,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         // Its light has threads of its own.
         Command::Serve(args) => return serve::run(args),
         Command::Bench(args) => return bench::run(args),
+        Command::Worker(args) => return worker::run(args),
     };
     if threads > 1024 {
         anyhow::bail!("--threads is {threads}, must be 0 (one for each core) to 1024");
@@ -101,5 +104,6 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::View(args) => view::run(&args),
         Command::Serve(args) => serve::run(&args),
         Command::Bench(args) => bench::run(&args),
+        Command::Worker(args) => worker::run(&args),
     })
 }

@@ -354,6 +354,57 @@ fn spares_can_be_added() {
     assert!(viewer.rejected[0].contains("--spare"), "{}", viewer.rejected[0]);
 }
 
+/// Workers light parts of the scene; the host puts them together.
+#[test]
+fn workers_light_what_one_server_would() {
+    let folder = TempDir::new().unwrap();
+    let served = Served::start(
+        folder.path(),
+        0,
+        &["--workers", "2", "--worker-token", "w", "--threshold", "0", "--load", "1"],
+    );
+    let (port, scene) = (served.port, served.scene());
+    let url = format!("http://127.0.0.1:{port}/");
+    let worker = |part: &str, token: &str| {
+        let arguments = ["worker", "--connect", &url, "--shard", part, "--token", token];
+        common::command::dapple(folder.path(), &arguments)
+            .stdout(std::process::Stdio::null())
+            .spawn()
+            .unwrap()
+    };
+    // One that may not, and one of a part that does not exist.
+    fail(folder.path(), &["worker", "--connect", &url, "--shard", "1/2", "--token", "x"], &["token"]);
+    fail(folder.path(), &["worker", "--connect", &url, "--shard", "1/3", "--token", "w"], &["1/2"]);
+    let mut viewer = Viewer::join(port, &scene, config(1));
+    viewer.run(Duration::from_millis(300));
+    assert!(!viewer.has_light() && served.text("/health").contains("waiting for workers"));
+    let mut first = worker("1/2", "w");
+    viewer.until("the first part's light", Viewer::has_light);
+    let of_first = viewer.held().unwrap().2.len();
+    let mut second = worker("2/2", "w");
+    viewer.until("the second part's light", |v| v.held().unwrap().2.len() > of_first);
+    assert!(viewer.guest.send(place(scene.instances[1].node, 0.3)));
+    assert!(viewer.guest.send(Event::Seek { time_s: 0.75 }));
+    assert!(viewer.guest.send(Event::Pause));
+    viewer.until("time stands still", |v| !v.guest.has_pending() && !v.guest.clock().playing);
+    // One dies while things change, and another takes its place.
+    second.kill().unwrap();
+    second.wait().unwrap();
+    assert!(viewer.guest.send(Event::Seek { time_s: 1.25 }));
+    viewer.until("the clock is set", |v| !v.guest.has_pending());
+    assert!(viewer.held().unwrap().2.len() > of_first, "the dead worker's light stays as it was");
+    let mut second = worker("2/2", "w");
+    let mut late = Viewer::join(port, &scene, config(2));
+    late.until("the light", Viewer::has_light);
+    let truth = oracle(&scene, viewer.guest.edits(), 1.25);
+    viewer.until("the light is that of one server", |v| v.held().unwrap().2 == truth);
+    settle(&mut [&mut viewer, &mut late]);
+    for worker in [&mut first, &mut second] {
+        worker.kill().unwrap();
+        worker.wait().unwrap();
+    }
+}
+
 #[test]
 fn what_cannot_be_served_is_said_before_anything_takes_time() {
     let folder = TempDir::new().unwrap();
@@ -374,6 +425,8 @@ fn what_cannot_be_served_is_said_before_anything_takes_time() {
         (&["--page", "."], &["there is no page"]),
         (&["--tls-cert", "broken.pem", "--tls-key", "broken.pem"], &["--tls-cert", "PEM"]),
         (&["--points", "0"], &["--points"]),
+        (&["--workers", "0"], &["--workers"]),
+        (&["--workers", "2", "--adaptive", "1"], &["--adaptive"]),
     ] {
         let arguments = with(more);
         let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();

@@ -87,7 +87,7 @@ impl LightHead {
 
 /// Puts pieces together, in whatever order they come.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Assembly {
+pub struct Assembly {
     /// Of the frame that is being put together; its offset is 0.
     head: LightHead,
     bytes: Vec<u8>,
@@ -98,7 +98,7 @@ pub(crate) struct Assembly {
 
 /// What a piece came to.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Assembled {
+pub enum Assembled {
     /// A whole frame (empty for none).
     Whole(LightHead, Vec<u8>),
     /// More is to come, or it has come before.
@@ -109,7 +109,7 @@ pub(crate) enum Assembled {
 
 impl Assembly {
     /// Takes the next piece of frames that have at most so many bytes.
-    pub(crate) fn push(&mut self, head: LightHead, piece: &[u8], max_bytes: usize) -> Assembled {
+    pub fn push(&mut self, head: LightHead, piece: &[u8], max_bytes: usize) -> Assembled {
         let (total, offset) = (head.total as usize, head.offset as usize);
         let fits = offset.is_multiple_of(CHUNK_BYTES) && piece.len() == CHUNK_BYTES.min(total - offset);
         if total > max_bytes || !fits {
@@ -138,7 +138,7 @@ impl Assembly {
     }
 
     /// Bytes of an unfinished frame that have come, and all of it.
-    pub(crate) fn progress(&self) -> (usize, usize) {
+    pub fn progress(&self) -> (usize, usize) {
         if self.bytes.is_empty() { (0, 0) } else { (self.came, self.bytes.len()) }
     }
 }

@@ -10,7 +10,7 @@ use dapple_scene::Scene;
 
 use crate::args::ServedArgs;
 use crate::progress::Bar;
-use crate::serve::process_of;
+use crate::serve::{LIGHT_THREADS, process_of, threads_of};
 use crate::view::fetch_scene;
 
 /// How long a server may take until it has light.
@@ -115,6 +115,11 @@ impl Served {
         let metrics = self.get("metrics")?;
         let figure = |name| self.figure(&metrics, name);
         Ok((figure("process_cpu_seconds_total"), figure("process_resident_memory_bytes") as u64))
+    }
+
+    /// Of it, what tracing and encoding took; `None` for a server that was not started here.
+    pub(crate) fn light_cpu(&self) -> Option<f64> {
+        threads_of(&self.child.as_ref()?.id().to_string(), LIGHT_THREADS)
     }
 
     /// Whether a server that was started here still runs.

@@ -27,9 +27,14 @@ struct Row {
     viewers: u32,
     /// Seconds of processor that the server takes a second, all of it.
     server_cpu: f64,
-    /// Mean of a step, milliseconds, and steps a second.
+    /// Of a step, what tracing and encoding take of all processors together, milliseconds; absent where that cannot be known.
+    light_cpu_ms: Option<f64>,
+    /// Everything else that the server's processors do, a viewer, microseconds a second.
+    viewer_cpu_us: Option<f64>,
+    /// Mean length of a step, milliseconds, and steps a second.
     step_ms: f64,
     steps_per_s: f64,
+    rays_per_step: f64,
     age_p50_ms: f64,
     age_p99_ms: f64,
     /// Of light, a viewer.
@@ -62,9 +67,11 @@ pub(crate) fn run(args: &ViewersArgs) -> Result<()> {
         .build()
         .context("cannot start the threads of viewers")?;
     say!(
-        "{:>8} {:>10} {:>9} {:>8} {:>9} {:>9} {:>9} {:>9} {:>9}",
+        "{:>8} {:>10} {:>13} {:>13} {:>8} {:>8} {:>9} {:>9} {:>8} {:>8} {:>7}",
         "viewers",
         "server CPU",
+        "light/step",
+        "each viewer",
         "step ms",
         "steps/s",
         "age p50",
@@ -77,9 +84,11 @@ pub(crate) fn run(args: &ViewersArgs) -> Result<()> {
     for count in &args.counts {
         let row = runtime.block_on(measure(&served, args, *count))?;
         say!(
-            "{:>8} {:>9.1} % {:>8.2} {:>8.1} {:>6.1} ms {:>6.1} ms {:>9.1} {:>9.0} {:>9.0}",
+            "{:>8} {:>8.1} % {:>13} {:>13} {:>8.1} {:>8.1} {:>6.1} ms {:>6.1} ms {:>8.1} {:>8.0} {:>7.0}",
             row.viewers,
             100.0 * row.server_cpu,
+            row.light_cpu_ms.map_or("–".to_owned(), |ms| format!("{ms:.1} CPU ms")),
+            row.viewer_cpu_us.map_or("–".to_owned(), |us| format!("{us:.0} CPU µs/s")),
             row.step_ms,
             row.steps_per_s,
             row.age_p50_ms,
@@ -89,12 +98,6 @@ pub(crate) fn run(args: &ViewersArgs) -> Result<()> {
             row.memory_mb
         );
         rows.push(row);
-    }
-    if let (Some(first), Some(last)) = (rows.first(), rows.last())
-        && last.viewers > first.viewers
-    {
-        let each = (last.server_cpu - first.server_cpu) / f64::from(last.viewers - first.viewers);
-        say!("a viewer more takes {:.0} microseconds of the server's processor a second", 1e6 * each);
     }
     if let Some(path) = &args.output {
         write_file(path, &serde_json::to_vec_pretty(&rows)?)?;
@@ -139,8 +142,9 @@ async fn measure(served: &Served, args: &ViewersArgs, count: u32) -> Result<Row>
         bot.log().keeps_ages = true;
     }
     let before = served.get("metrics")?;
-    let ((cpu, _), start) = (served.process()?, Instant::now());
+    let ((cpu, _), light, start) = (served.process()?, served.light_cpu(), Instant::now());
     tokio::time::sleep(Duration::from_secs_f64(args.seconds)).await;
+    let light = served.light_cpu().zip(light).map(|(after, before)| after - before);
     let ((cpu_after, memory), seconds) = (served.process()?, start.elapsed().as_secs_f64());
     let after = served.get("metrics")?;
     let (bytes, frames) = (sum(|log| log.bytes) - bytes, sum(|log| log.frames) - frames);
@@ -155,9 +159,13 @@ async fn measure(served: &Served, args: &ViewersArgs, count: u32) -> Result<Row>
     check(&bots)?;
     let grown = |name| served.figure(&after, name) - served.figure(&before, name);
     let steps = grown("dapple_steps_total");
+    let cpu = cpu_after - cpu;
     Ok(Row {
         viewers: count,
-        server_cpu: (cpu_after - cpu) / seconds,
+        server_cpu: cpu / seconds,
+        light_cpu_ms: light.map(|light| 1e3 * light / steps.max(1.0)),
+        viewer_cpu_us: light.map(|light| 1e6 * (cpu - light).max(0.0) / seconds / f64::from(count)),
+        rays_per_step: grown("dapple_rays_total") / steps.max(1.0),
         step_ms: 1e3 * grown("dapple_stepping_seconds_total") / steps.max(1.0),
         steps_per_s: steps / seconds,
         age_p50_ms: 1e3 * percentile(&ages, 0.5),

@@ -61,7 +61,7 @@ impl Hub {
     }
 
     pub(crate) fn set_phase(&self, phase: Phase) {
-        self.phase.send_replace(phase);
+        self.phase.send_if_modified(|now| std::mem::replace(now, phase.clone()) != phase);
     }
 
     pub(crate) fn phase(&self) -> Phase {

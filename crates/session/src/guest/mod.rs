@@ -19,8 +19,11 @@ use backoff::Backoff;
 use pending::Pending;
 use timing::Timing;
 
-/// Shortest time between two looks while light comes or the camera moves, microseconds.
+/// Shortest time between two looks, microseconds.
 const LOOK_EVERY_US: u64 = 100_000;
+
+/// Shortest time between two looks that only say what has come: half of what a host waits for before it holds light back.
+const RECEIPT_EVERY_US: u64 = 250_000;
 
 /// Longest time between two looks: the host lets go whom it does not hear.
 const ALIVE_EVERY_US: u64 = 1_000_000;
@@ -278,12 +281,13 @@ impl Guest {
     fn next_look(&mut self, now_us: u64) -> Option<String> {
         let since_us = now_us.saturating_sub(self.said_us);
         let is_news = self.look.camera != self.said.camera
-            || self.look.came != self.said.came
             || self.look.lost != self.said.lost
-            || self.held != self.said.held
             || self.version != self.said.state;
-        let is_first = self.said.number == 0;
-        if !(is_first || is_news && since_us >= LOOK_EVERY_US || since_us >= ALIVE_EVERY_US) {
+        let has_come = self.look.came != self.said.came || self.held != self.said.held;
+        let is_due = is_news && since_us >= LOOK_EVERY_US
+            || has_come && since_us >= RECEIPT_EVERY_US
+            || since_us >= ALIVE_EVERY_US;
+        if self.said.number > 0 && !is_due {
             return None;
         }
         self.look.number += 1;

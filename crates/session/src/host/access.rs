@@ -31,6 +31,11 @@ impl Access {
         self.tokens.iter().all(|(_, role)| *role != Role::View).then_some(Role::View)
     }
 
+    /// Whether this is one of the tokens.
+    pub fn knows(&self, token: Option<&str>) -> bool {
+        token.is_some_and(|token| self.tokens.iter().any(|(known, _)| equal(known, token)))
+    }
+
     pub(super) fn role(&self, token: Option<&str>) -> Result<Role, Refusal> {
         let refusal = |message: &str| Refusal::new(Reason::Token, message);
         if self.tokens.is_empty() {
