@@ -448,3 +448,43 @@ fn a_soak_loses_nothing_and_memory_stays_flat() {
     assert!(out.contains("no event was lost"), "{out}");
     println!("{out}");
 }
+
+#[test]
+fn with_a_certificate_it_speaks_tls_alone() {
+    use tokio_rustls::rustls::pki_types::ServerName;
+    use tokio_rustls::rustls::{ClientConfig, ClientConnection, RootCertStore, StreamOwned, crypto};
+
+    let folder = TempDir::new().unwrap();
+    let made = rcgen::generate_simple_self_signed(["localhost".to_owned()]).unwrap();
+    std::fs::write(folder.path().join("cert.pem"), made.cert.pem()).unwrap();
+    std::fs::write(folder.path().join("key.pem"), made.signing_key.serialize_pem()).unwrap();
+    let served = Served::start(folder.path(), 0, &["--tls-cert", "cert.pem", "--tls-key", "key.pem"]);
+    let mut roots = RootCertStore::empty();
+    roots.add(made.cert.der().clone()).unwrap();
+    let config = ClientConfig::builder_with_provider(Arc::new(crypto::ring::default_provider()))
+        .with_safe_default_protocol_versions()
+        .unwrap()
+        .with_root_certificates(roots)
+        .with_no_client_auth();
+    let name = ServerName::try_from("localhost").unwrap();
+    let connection = ClientConnection::new(Arc::new(config), name).unwrap();
+    let socket = TcpStream::connect(("127.0.0.1", served.port)).unwrap();
+    let mut tls = StreamOwned::new(connection, socket);
+    tls.write_all(b"GET /health HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").unwrap();
+    let mut answer = Vec::new();
+    // A server need not say that TLS ends where HTTP has.
+    let _ = tls.read_to_end(&mut answer);
+    let answer = String::from_utf8_lossy(&answer);
+    assert!(answer.starts_with("HTTP/1.1 200") && answer.contains("\"status\""), "{answer}");
+    // Who speaks without gets nothing that looks like an answer.
+    let mut plain = TcpStream::connect(("127.0.0.1", served.port)).unwrap();
+    plain.write_all(b"GET /health HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
+    let mut nothing = Vec::new();
+    let _ = plain.read_to_end(&mut nothing);
+    assert!(!String::from_utf8_lossy(&nothing).contains("HTTP"));
+    // Certificate and key of different pairs.
+    let other = rcgen::generate_simple_self_signed(["localhost".to_owned()]).unwrap();
+    std::fs::write(folder.path().join("other.pem"), other.signing_key.serialize_pem()).unwrap();
+    let arguments = [&SMALL[..], &["--tls-cert", "cert.pem", "--tls-key", "other.pem"]].concat();
+    fail(folder.path(), &arguments, &["do not belong together"]);
+}

@@ -55,7 +55,7 @@ fn parts_put_together_are_the_whole_to_the_bit() {
     let mut viewer = Subscriber::new(Some(scene.hash().0), Limits::default());
     let mut edits = Edits::new(&scene);
     for step in 0..12 {
-        let time_s = f64::from(step) * 0.3;
+        let time_s = step as f64 * 0.3;
         if step == 4 {
             let placement =
                 Placement { translation: [0.1, 0.5, 0.2], rotation: [0.0, 0.0, 0.0, 1.0], scale: [1.0; 3] };
