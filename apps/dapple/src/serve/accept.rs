@@ -47,7 +47,7 @@ pub(crate) fn tls(certificates: &Path, key: &Path) -> Result<TlsAcceptor> {
         .and_then(Iterator::collect)
         .with_context(|| format!("--tls-cert {}: not certificates in PEM", certificates.display()))?;
     if chain.is_empty() {
-        bail!("--tls-cert {}: it holds no certificate", certificates.display());
+        bail!("--tls-cert {}: it holds no certificate in PEM", certificates.display());
     }
     let key = PrivateKeyDer::from_pem_file(key)
         .with_context(|| format!("--tls-key {}: not a key in PEM", key.display()))?;
