@@ -36,13 +36,19 @@ const VIEWER_LINES: &str = r#"{"type":"event","number":1,"event":{"event":"pause
 {"type":"hello","protocol":1,"wire":4,"scene":"00","token":"t","key":"k","bits_per_s":500000}"#;
 
 /// What hosts say, one of each.
-const HOST_LINES: &str = r#"{"type":"welcome","protocol":1,"viewer":1,"key":"k","role":"interact","hz":30.0,"heard":0,"bits_per_s":null,"events_per_s":60,"clock_us":1,"unix_us":2}
+const HOST_LINES: &str = r#"{"type":"welcome","protocol":1,"viewer":1,"key":"k","role":"interact","hz":30.0,"heard":0,"goes_on":false,"bits_per_s":null,"events_per_s":60,"clock_us":1,"unix_us":2}
 {"type":"state","version":1,"clock":{"playing":true,"time_us":0,"at_us":0},"edits":{"placed":[],"removed":[],"lights":[]}}
 {"type":"changes","from":1,"to":2,"clock":{"playing":false,"time_us":5,"at_us":6},"edits":[{"edit":"remove","instance":0}]}
 {"type":"heard","number":3}
 {"type":"rejected","number":4,"message":"no"}
 {"type":"status","viewers":2,"step_us":3,"queue_us":4,"round_trip_us":5,"ray_budget":6,"waiting":7}
 {"type":"refused","reason":"closing","message":"later"}"#;
+
+/// What hosts and workers say to each other, one of each.
+const WORK_LINES: &str = r#"{"type":"hello","protocol":1,"wire":4,"scene":"00","shard":0,"of":2,"token":"t"}
+{"type":"done","stamp_us":1,"rays":2,"changed":3,"waiting":4,"points":5}
+{"type":"setup","points_per_m2":512.0,"seed":1,"rays":64,"rays_still":0,"radius_m":0.6,"cuts":true,"step_s":0.02,"ray_budget":null}
+{"type":"step","stamp_us":1,"scene_us":2,"state":3,"edits":{"placed":[],"removed":[1],"lights":[]},"looks":[{"eye":[0,1,2],"forward":[0,0,-1],"up":[0,1,0],"yfov":0.9,"aspect":1.5}]}"#;
 
 /// The store that seeds and targets have in common: regular enough that its sections compress.
 pub(crate) fn sample() -> PointStore {
@@ -151,7 +157,7 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
         seeds.push(("read_recording", name.to_owned(), recording(name, frames)));
     }
 
-    for (name, lines) in [("viewer", VIEWER_LINES), ("host", HOST_LINES)] {
+    for (name, lines) in [("viewer", VIEWER_LINES), ("host", HOST_LINES), ("work", WORK_LINES)] {
         seeds.push(("live_session", name.to_owned(), lines.as_bytes().to_vec()));
     }
     let mut light = dapple_session::LightHead { made_us: 7, ..Default::default() }.messages(&[1, 2, 3]);

@@ -4,6 +4,7 @@ use std::sync::{Arc, LazyLock};
 
 use dapple_scene::{Instance, NoFiles, Scene};
 use dapple_session::host::{Arrival, Host, HostConfig, Next, hex};
+use dapple_session::work::{FromWorker, ToWorker};
 use dapple_session::{
     FromHost, FromViewer, Guest, GuestConfig, Hello, LightHead, News, PROTOCOL, Role, SceneClock, Status,
 };
@@ -30,7 +31,8 @@ pub fn live_session(data: &[u8]) {
         scene: hex(&scene.hash().0),
         ..Hello::default()
     };
-    let arrival = |key: &str| Arrival { key: key.to_owned(), is_reliable: true, unix_us: 0 };
+    let arrival =
+        |key: &str| Arrival { key: key.to_owned(), is_reliable: true, is_foreign: false, unix_us: 0 };
     let watcher = host.join(&hello, arrival("watcher"), 0).expect("it fits");
     let mut listener = Guest::new(scene.clone(), GuestConfig::default());
     listener.connected(0);
@@ -50,6 +52,13 @@ pub fn live_session(data: &[u8]) {
             }
             if let Ok(message) = FromHost::parse(text) {
                 let again = FromHost::parse(&message.to_text()).expect("what was read can be written");
+                assert_eq!(again.to_text(), message.to_text());
+            }
+            if let Ok(message) = FromWorker::parse(text) {
+                assert_eq!(FromWorker::parse(&message.to_text()).ok(), Some(message));
+            }
+            if let Ok(message) = ToWorker::parse(text) {
+                let again = ToWorker::parse(&message.to_text()).expect("what was read can be written");
                 assert_eq!(again.to_text(), message.to_text());
             }
             let _ = victim.receive_text(text);

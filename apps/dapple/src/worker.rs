@@ -25,6 +25,9 @@ use crate::view::fetch_scene;
 /// Waits between two tries to connect, the shortest and the longest.
 const RETRY: (Duration, Duration) = (Duration::from_millis(500), Duration::from_secs(10));
 
+/// A host says something every second.
+const SILENCE: Duration = Duration::from_secs(15);
+
 /// Works until told to stop.
 pub(crate) fn run(args: &WorkerArgs) -> Result<()> {
     if args.threads > 1024 {
@@ -84,7 +87,9 @@ async fn converse(address: &str, hello: &WorkerHello, light: &mut Light) -> Resu
     light.begin();
     loop {
         tokio::select! {
-            message = inbound.receive() => match message {
+            message = tokio::time::timeout(SILENCE, inbound.receive()) => match message {
+                Err(_) => return Ok(format!("the host has said nothing for {} s", SILENCE.as_secs())),
+                Ok(message) => match message {
                 Ok(Some(Message::Text(text))) => match ToWorker::parse(&text).context("the host says what this worker does not know")? {
                     ToWorker::Setup(setup) => light.set_up(setup),
                     ToWorker::Step(step) => light.ask(step),
@@ -94,6 +99,7 @@ async fn converse(address: &str, hello: &WorkerHello, light: &mut Light) -> Resu
                 Ok(Some(Message::Bytes(_))) => bail!("the host sends light to a worker: it is none"),
                 Ok(None) => return Ok("the host closed the connection".to_owned()),
                 Err(error) => return Ok(error.to_string()),
+                },
             },
             answer = light.answers.recv() => match answer.ok_or_else(|| anyhow!("the light ended in a panic"))? {
                 Answer::Failed(reason) => bail!("{reason}"),

@@ -367,10 +367,8 @@ fn workers_light_what_one_server_would() {
     let url = format!("http://127.0.0.1:{port}/");
     let worker = |part: &str, token: &str| {
         let arguments = ["worker", "--connect", &url, "--shard", part, "--token", token];
-        common::command::dapple(folder.path(), &arguments)
-            .stdout(std::process::Stdio::null())
-            .spawn()
-            .unwrap()
+        let mut command = common::command::dapple(folder.path(), &arguments);
+        Killed(command.stdout(std::process::Stdio::null()).spawn().unwrap())
     };
     // One that may not, and one of a part that does not exist.
     fail(folder.path(), &["worker", "--connect", &url, "--shard", "1/2", "--token", "x"], &["token"]);
@@ -378,30 +376,35 @@ fn workers_light_what_one_server_would() {
     let mut viewer = Viewer::join(port, &scene, config(1));
     viewer.run(Duration::from_millis(300));
     assert!(!viewer.has_light() && served.text("/health").contains("waiting for workers"));
-    let mut first = worker("1/2", "w");
+    let _first = worker("1/2", "w");
     viewer.until("the first part's light", Viewer::has_light);
     let of_first = viewer.held().unwrap().2.len();
-    let mut second = worker("2/2", "w");
+    let second = worker("2/2", "w");
     viewer.until("the second part's light", |v| v.held().unwrap().2.len() > of_first);
     assert!(viewer.guest.send(place(scene.instances[1].node, 0.3)));
     assert!(viewer.guest.send(Event::Seek { time_s: 0.75 }));
     assert!(viewer.guest.send(Event::Pause));
     viewer.until("time stands still", |v| !v.guest.has_pending() && !v.guest.clock().playing);
     // One dies while things change, and another takes its place.
-    second.kill().unwrap();
-    second.wait().unwrap();
+    drop(second);
     assert!(viewer.guest.send(Event::Seek { time_s: 1.25 }));
     viewer.until("the clock is set", |v| !v.guest.has_pending());
     assert!(viewer.held().unwrap().2.len() > of_first, "the dead worker's light stays as it was");
-    let mut second = worker("2/2", "w");
+    let _second = worker("2/2", "w");
     let mut late = Viewer::join(port, &scene, config(2));
     late.until("the light", Viewer::has_light);
     let truth = oracle(&scene, viewer.guest.edits(), 1.25);
     viewer.until("the light is that of one server", |v| v.held().unwrap().2 == truth);
     settle(&mut [&mut viewer, &mut late]);
-    for worker in [&mut first, &mut second] {
-        worker.kill().unwrap();
-        worker.wait().unwrap();
+}
+
+/// A program that does not outlive its test.
+struct Killed(std::process::Child);
+
+impl Drop for Killed {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
     }
 }
 

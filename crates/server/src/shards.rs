@@ -99,6 +99,11 @@ impl Merger {
         }
     }
 
+    /// A server begins anew, perhaps another one in its place: its next frame is a snapshot of any group. What came before stays until then.
+    pub fn begin(&mut self, shard: u32) {
+        self.shards[shard as usize].subscriber.forget();
+    }
+
     /// Takes a frame of a server.
     ///
     /// # Errors

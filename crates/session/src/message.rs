@@ -315,6 +315,8 @@ pub struct Welcome {
     pub hz: f64,
     /// Number of its last event that was dealt with, 0 for none.
     pub heard: u32,
+    /// Whether light goes on from what the viewer holds. If not, what it holds is of no use: its groups and epochs are another stream's.
+    pub goes_on: bool,
     /// Most bits of light that it is sent in any second; `None`: as many as it takes.
     pub bits_per_s: Option<u64>,
     /// Most events a second.
@@ -397,6 +399,9 @@ pub struct Status {
     pub ray_budget: u64,
     /// Points that wait for rays, or for bits.
     pub waiting: u32,
+    /// How much of the first light there is, per mille; 1000 once it is there.
+    #[serde(default)]
+    pub started: u32,
 }
 
 pub(crate) fn check_length(text: &str, limit: usize) -> Result<(), MessageError> {

@@ -38,7 +38,7 @@ pub(crate) struct ServeArgs {
     /// Spare instances of an object, by the name of its node or of its mesh, which viewers may add to the scene.
     #[arg(long, value_name = "NAME=N")]
     pub(crate) spare: Vec<Named<u32>>,
-    /// Keep what is sent in a recording.
+    /// Keep the light in a recording, by scene time: until the end, or until scene time jumps. What viewers change of the scene is not in it.
     #[arg(long, value_name = "FILE.dapple")]
     pub(crate) record: Option<PathBuf>,
     /// A secret and what it allows: view=SECRET or interact=SECRET. Without any, everyone may do everything; with one for interact alone, the

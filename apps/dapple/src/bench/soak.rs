@@ -67,6 +67,8 @@ struct Story {
     broken: u32,
     stalled: u32,
     events: u32,
+    /// Where it put its node last.
+    last: Option<(u32, Placement)>,
 }
 
 async fn soak(served: &mut Served, args: &SoakArgs) -> Result<Outcome> {
@@ -98,9 +100,12 @@ async fn soak(served: &mut Served, args: &SoakArgs) -> Result<Outcome> {
     }
     drop(bar);
     let mut story = Story::default();
+    let mut last = Vec::new();
     for place in places {
         let part = place.await.context("a viewer ended in a panic")??;
+        last.extend(part.last);
         story = Story {
+            last: None,
             joined: story.joined + part.joined,
             broken: story.broken + part.broken,
             stalled: story.stalled + part.stalled,
@@ -108,7 +113,7 @@ async fn soak(served: &mut Served, args: &SoakArgs) -> Result<Outcome> {
         };
     }
     settle(&keepers).await?;
-    check(served, &keepers, &story)?;
+    check(served, &keepers, &story, &last)?;
     stop.send_replace(true);
     for task in tasks {
         task.await.context("a viewer ended in a panic")?;
@@ -173,13 +178,15 @@ async fn live_on(
                 }
                 2..5 => {
                     let count = 1 + random.below(10) as u32;
-                    for number in 0..count {
-                        let event = movement(&scene, place, story.events + number);
+                    for _ in 0..count {
+                        let (node, placement) = movement(&scene, place, story.events);
+                        let event = Event::Edit { change: Edit::Place { node, placement } };
                         if bot.shared.lock().send(event) {
+                            story.events += 1;
+                            story.last = Some((node, placement));
                             let _ = tokio::time::timeout(Duration::from_millis(40), &mut viewing).await;
                         }
                     }
-                    story.events += count;
                 }
                 _ => drop(tokio::time::timeout(stay, &mut viewing).await),
             }
@@ -191,7 +198,7 @@ async fn live_on(
             }
         };
         tokio::select! {
-            () = &mut viewing => {}
+            () = &mut viewing => bail!("a session ended for good: {:?}", *bot.state.borrow()),
             answered = tokio::time::timeout(SETTLE, answered) => {
                 if answered.is_err() {
                     bail!("an event was not answered within {} s", SETTLE.as_secs());
@@ -213,14 +220,14 @@ async fn live_on(
 }
 
 /// An instance's node goes a little further each time.
-fn movement(scene: &dapple_scene::Scene, place: u32, number: u32) -> Event {
+fn movement(scene: &dapple_scene::Scene, place: u32, number: u32) -> (u32, Placement) {
     let instance = &scene.instances[place as usize % scene.instances.len()];
     let placement = Placement {
         translation: [0.01 * (number % 100) as f32, 0.5, 0.1 * (place % 20) as f32],
         rotation: [0.0, 0.0, 0.0, 1.0],
         scale: [1.0; 3],
     };
-    Event::Edit { change: Edit::Place { node: instance.node, placement } }
+    (instance.node, placement)
 }
 
 /// Waits until those who stayed hold the same, while time stands still.
@@ -233,8 +240,9 @@ async fn settle(keepers: &[Arc<Bot>]) -> Result<()> {
         let held: Vec<_> = keepers
             .iter()
             .map(|bot| {
-                let log = bot.log();
+                // In the order in which they are taken where messages come in.
                 let guest = bot.shared.lock();
+                let log = bot.log();
                 let subscriber = log.subscriber.as_ref();
                 let light =
                     subscriber.and_then(|s| Some((s.group()?, s.epoch()?, s.store()?.visibility().to_vec())));
@@ -259,7 +267,15 @@ async fn settle(keepers: &[Arc<Bot>]) -> Result<()> {
 }
 
 /// Everyone heard everything, and the server counted what was sent.
-fn check(served: &Served, keepers: &[Arc<Bot>], story: &Story) -> Result<()> {
+fn check(served: &Served, keepers: &[Arc<Bot>], story: &Story, last: &[(u32, Placement)]) -> Result<()> {
+    let edits = keepers[0].shared.lock().edits().clone();
+    for (node, placement) in last {
+        // Who shares a node with another place may have been overtaken.
+        let is_alone = last.iter().filter(|(other, _)| other == node).count() == 1;
+        if is_alone && edits.placed.get(node) != Some(placement) {
+            bail!("node {node} was put to {placement:?} and stands at {:?}", edits.placed.get(node));
+        }
+    }
     for bot in keepers {
         if let Some(failure) = bot.log().failures.first() {
             bail!("a viewer that stayed could not take a frame: {failure}");

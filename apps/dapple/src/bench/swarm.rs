@@ -77,6 +77,11 @@ impl Bot {
                     log.light(guest, &frame, start);
                 }
             }
+            News::Welcome(goes_on) => {
+                if let (false, Some(subscriber)) = (goes_on, &mut log.subscriber) {
+                    subscriber.outdate();
+                }
+            }
             News::Rejected(_) => log.rejected += 1,
             _ => {}
         }

@@ -22,6 +22,9 @@ pub(crate) type Permit = Arc<OwnedSemaphorePermit>;
 /// How long the head of a request, or the start of TLS, may take.
 const PATIENCE: Duration = Duration::from_secs(5);
 
+/// How long a connection may last that is no session: nobody may keep its place by reading slowly.
+const LONGEST: Duration = Duration::from_secs(300);
+
 /// Bytes that the system may hold for a connection on their way out: what waits there cannot be replaced by newer light.
 const SEND_BUFFER_BYTES: usize = 256 << 10;
 
@@ -118,7 +121,10 @@ async fn http(
         .header_read_timeout(PATIENCE)
         .serve_connection(TokioIo::new(stream), TowerToHyperService::new(router))
         .with_upgrades();
-    if let Err(error) = connection.await {
-        tracing::debug!("a connection ended: {error}");
+    // Sessions go on by themselves once they have begun.
+    match tokio::time::timeout(LONGEST, connection).await {
+        Ok(Ok(())) => {}
+        Ok(Err(error)) => tracing::debug!("a connection ended: {error}"),
+        Err(_) => tracing::debug!("a connection took too long"),
     }
 }

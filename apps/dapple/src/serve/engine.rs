@@ -1,7 +1,7 @@
 //! The thread that lights: a step a tick, frames for all viewers.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
@@ -16,7 +16,7 @@ use dapple_trace::psao::update::{ConvexVolume, StepInput};
 use super::hub::{Hub, Phase};
 use super::ration::Ration;
 use super::recording::LiveRecording;
-use super::work::Workforce;
+use super::work::{Sent, Workforce};
 
 /// Most views that a step looks through; where there are more viewers, others each time.
 const MOST_VIEWS: usize = 32;
@@ -58,15 +58,24 @@ impl Engine {
         if let Err(error) = &result {
             self.hub.set_phase(Phase::Failed(format!("{error:#}")));
         }
-        if let Some(recording) = self.recording.take() {
-            let seconds = recording.finish()?;
-            tracing::info!(seconds, "the recording is complete");
-        }
+        self.finish_recording("the recording is complete");
         result
+    }
+
+    /// Puts the recording in its place, and says why.
+    fn finish_recording(&mut self, why: &str) {
+        let Some(recording) = self.recording.take() else { return };
+        match recording.finish() {
+            Ok(seconds) => tracing::info!(seconds, "{why}"),
+            Err(error) => tracing::error!("the recording was lost: {error:#}"),
+        }
     }
 
     fn light(&mut self) -> Result<()> {
         let mut light = self.start()?;
+        // What viewers have changed meanwhile.
+        let edits = self.hub.host().state().2.clone();
+        light.set_edits(&edits);
         let period = Duration::from_secs_f64(1.0 / self.hz);
         let mut due = Instant::now();
         let mut turn = 0;
@@ -102,12 +111,16 @@ impl Engine {
             return Ok(Light::Workers(Box::new(merger), workforce, patience));
         }
         let part = |done: usize, of: usize| (1000 * done / of.max(1)) as u32;
+        let beat = Beat::default();
         let progress = |progress| {
-            hub.set_phase(match progress {
-                Progress::Laying(done, of) => Phase::Starting("laying points", part(done, of)),
-                Progress::Tracing(done, of) => Phase::Starting("tracing points", part(done, of)),
-                Progress::Cutting(done, of) => Phase::Starting("finding what stands between", part(done, of)),
-            });
+            // Laying, tracing and cutting take about these parts of a start, as they do of a recording's.
+            let (what, of_stage, from, to) = match progress {
+                Progress::Laying(done, of) => ("laying points", part(done, of), 0, 400),
+                Progress::Tracing(done, of) => ("tracing points", part(done, of), 400, 900),
+                Progress::Cutting(done, of) => ("finding what stands between", part(done, of), 900, 1000),
+            };
+            hub.set_phase(Phase::Starting(what, of_stage));
+            beat.tell(&hub, from + (to - from) * of_stage / 1000);
         };
         let started = Instant::now();
         let mut server = Server::new(scene, &self.config, &progress)?;
@@ -133,7 +146,7 @@ impl Engine {
         }
         self.hub.set_phase(light.phase());
         if !watched.contains(&true) && self.recording.is_none() && light.is_warm() {
-            light.idle();
+            light.idle(&tick);
             // Nobody looks. Who comes gets what has changed since with the next step.
             hub.step_done();
             return Ok(());
@@ -150,6 +163,7 @@ impl Engine {
         let status = Status {
             ray_budget: self.ration.rays().unwrap_or(0),
             waiting: report.counts.backlog.max(report.held_back),
+            started: 1000,
             ..Status::default()
         };
         let wanted: Vec<usize> = {
@@ -181,6 +195,9 @@ impl Engine {
     }
 
     fn record(&mut self, light: &Light, tick: &Tick, frame: Option<&Frame>) {
+        if self.recording.as_ref().is_some_and(|recording| recording.has_jumped(tick.scene_us)) {
+            self.finish_recording("scene time has jumped: the recording ends before that");
+        }
         let Some(recording) = &mut self.recording else { return };
         let joined = if recording.wants_snapshot() { light.join(0) } else { None };
         let recorded = match joined.as_ref().or(frame) {
@@ -195,6 +212,30 @@ impl Engine {
     }
 }
 
+/// Keeps viewers company while there is no light yet: they hear how far it is, and each other's events.
+#[derive(Default)]
+struct Beat {
+    last_us: AtomicU64,
+}
+
+impl Beat {
+    const EVERY_US: u64 = 250_000;
+
+    fn tell(&self, hub: &Hub, mille: u32) {
+        let (now_us, last_us) = (hub.now_us(), self.last_us.load(Ordering::Relaxed));
+        let is_due = now_us.saturating_sub(last_us) >= Beat::EVERY_US;
+        let swap = |order| self.last_us.compare_exchange(last_us, now_us, order, order);
+        if !is_due || swap(Ordering::Relaxed).is_err() {
+            return;
+        }
+        let mut host = hub.host();
+        let tick = host.begin_step(now_us);
+        host.end_step(&tick, now_us, Status { started: mille.min(999), ..Status::default() });
+        drop(host);
+        hub.step_done();
+    }
+}
+
 impl Light {
     fn set_edits(&mut self, edits: &Edits) {
         match self {
@@ -205,8 +246,8 @@ impl Light {
 
     fn phase(&self) -> Phase {
         match self {
-            Light::Workers(_, workforce, _) if workforce.present() < workforce.parts() => {
-                let mille = 1000 * workforce.present() / workforce.parts();
+            Light::Workers(_, workforce, _) if workforce.begun() < workforce.parts() => {
+                let mille = 1000 * workforce.begun() / workforce.parts();
                 Phase::Starting("waiting for workers", mille as u32)
             }
             _ => Phase::Serving,
@@ -222,9 +263,10 @@ impl Light {
     }
 
     /// Nothing is to be lit; who comes and goes is heard all the same.
-    fn idle(&mut self) {
+    fn idle(&mut self, tick: &Tick) {
         if let Light::Workers(merger, workforce, _) = self {
-            take_light(merger, workforce.idle());
+            let news = workforce.idle(tick);
+            take_light(merger, workforce, news);
         }
     }
 
@@ -260,7 +302,7 @@ impl Light {
                 let mut report = StepReport { rays: work.rays, points: work.points, ..StepReport::default() };
                 report.counts.backlog = work.waiting;
                 report.changed = work.changed;
-                take_light(merger, work.light);
+                take_light(merger, workforce, work.light);
                 let frames = merger.publish(sent_s, wants);
                 Ok(Made { report, frames, made_us: hub.now_us() })
             }
@@ -283,11 +325,16 @@ impl Light {
     }
 }
 
-/// Puts what workers sent into the whole. A frame that does not fit is left out: its worker's next connection begins with a snapshot.
-fn take_light(merger: &mut Merger, light: Vec<(u32, Vec<u8>)>) {
-    for (shard, frame) in light {
+/// Puts what workers sent into the whole. Whose frame does not fit is let go: the next connection begins with a snapshot.
+fn take_light(merger: &mut Merger, workforce: &Workforce, light: Vec<(u32, Sent)>) {
+    for (shard, sent) in light {
+        let Sent::Frame(frame) = sent else {
+            merger.begin(shard);
+            continue;
+        };
         if let Err(error) = merger.receive(shard, &frame) {
             tracing::warn!(part = shard + 1, "a worker's light does not fit: {error}");
+            workforce.let_go(shard, &error);
         }
     }
 }

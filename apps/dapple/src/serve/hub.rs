@@ -61,7 +61,12 @@ impl Hub {
     }
 
     pub(crate) fn set_phase(&self, phase: Phase) {
-        self.phase.send_if_modified(|now| std::mem::replace(now, phase.clone()) != phase);
+        self.phase.send_if_modified(|now| {
+            // The end is final, whatever the light still does.
+            let is_final = matches!(now, Phase::Failed(_))
+                || *now == Phase::Draining && !matches!(phase, Phase::Failed(_));
+            !is_final && std::mem::replace(now, phase.clone()) != phase
+        });
     }
 
     pub(crate) fn phase(&self) -> Phase {
@@ -73,12 +78,12 @@ impl Hub {
     }
 
     /// What a new connection is told apart by.
-    pub(crate) fn arrival(&self, is_reliable: bool) -> Result<Arrival, getrandom::Error> {
+    pub(crate) fn arrival(&self, is_reliable: bool, is_foreign: bool) -> Result<Arrival, getrandom::Error> {
         let mut secret = [0; 16];
         getrandom::fill(&mut secret)?;
         let unix_us =
             SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_micros() as u64);
-        Ok(Arrival { key: dapple_session::host::hex(&secret), is_reliable, unix_us })
+        Ok(Arrival { key: dapple_session::host::hex(&secret), is_reliable, is_foreign, unix_us })
     }
 }
 

@@ -143,11 +143,6 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     if let Some(parts) = args.workers {
         say!("It waits for workers: dapple worker --connect {url} --shard 1/{parts}, to {parts}/{parts}\n");
     }
-    if !address.ip().is_loopback() && args.workers.is_some() && args.worker_token.is_none() {
-        tracing::warn!(
-            "whoever reaches this address may light the scene: --worker-token SECRET keeps that to some"
-        );
-    }
     if !address.ip().is_loopback() && access.open_role() == Some(Role::Interact) {
         tracing::warn!(
             "whoever reaches this address may change the scene: --token interact=SECRET keeps that to some"
@@ -181,6 +176,20 @@ fn check(args: &ServeArgs) -> Result<()> {
     if args.workers.is_some() && args.light.visibility.adaptive > 0.0 {
         bail!(
             "--adaptive weighs density over the whole scene, which no worker sees: leave it out with --workers"
+        );
+    }
+    if args.workers.is_some() && args.tls_cert.is_some() {
+        bail!("workers speak plain HTTP: leave out --tls-cert, and put a proxy with TLS before the viewers");
+    }
+    if args.worker_token.as_deref() == Some("") {
+        bail!("--worker-token is empty: give a secret, or leave it out");
+    }
+    let is_open =
+        args.host.parse().is_ok_and(|ip: std::net::IpAddr| ip.is_loopback()) || args.host == "localhost";
+    if args.workers.is_some() && args.worker_token.is_none() && (!is_open || !args.token.is_empty()) {
+        bail!(
+            "whoever reaches {} could light the scene: --worker-token SECRET keeps that to workers",
+            args.host
         );
     }
     if args.threads > 1024 {

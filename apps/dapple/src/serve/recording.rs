@@ -11,6 +11,9 @@ use dapple_stream::{Frame, FrameKind, Recorder, RecordingHeader};
 /// A snapshot is recorded again after this, microseconds of scene time, so that a player can begin there.
 const SNAPSHOT_EVERY_US: u64 = 5_000_000;
 
+/// A step of scene time longer than this is a jump, microseconds.
+const LONGEST_GAP_US: u64 = 30_000_000;
+
 /// A recording that grows beside its file, which it replaces when it is whole.
 pub(crate) struct LiveRecording {
     path: PathBuf,
@@ -20,6 +23,7 @@ pub(crate) struct LiveRecording {
     recorder: Recorder,
     last_us: u64,
     snapshot_us: Option<u64>,
+    is_broken: bool,
 }
 
 impl LiveRecording {
@@ -40,6 +44,7 @@ impl LiveRecording {
             recorder,
             last_us: 0,
             snapshot_us: None,
+            is_broken: false,
         };
         recording.write(&bytes)?;
         Ok(recording)
@@ -50,9 +55,14 @@ impl LiveRecording {
         self.snapshot_us.is_none_or(|at_us| self.last_us.saturating_sub(at_us) >= SNAPSHOT_EVERY_US)
     }
 
-    /// Records a frame at a scene time. Times that go back count as the latest.
+    /// Whether scene time has jumped since the last frame: a recording cannot follow, as a player's scene does not jump along.
+    pub(crate) fn has_jumped(&self, scene_us: u64) -> bool {
+        self.snapshot_us.is_some() && (scene_us < self.last_us || scene_us - self.last_us > LONGEST_GAP_US)
+    }
+
+    /// Records a frame at a scene time, which must not go back.
     pub(crate) fn frame(&mut self, scene_us: u64, frame: &Frame) -> Result<()> {
-        self.last_us = self.last_us.max(scene_us.min(MAX_DURATION_US));
+        self.last_us = scene_us.min(MAX_DURATION_US);
         if frame.kind == FrameKind::Snapshot {
             self.snapshot_us = Some(self.last_us);
         }
@@ -78,13 +88,19 @@ impl LiveRecording {
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<()> {
-        self.file.write_all(bytes).with_context(|| format!("cannot write {}", self.partial.display()))
+        let written = self.file.write_all(bytes);
+        // What is there can still be looked at, up to where it breaks off.
+        self.is_broken |= written.is_err();
+        written
+            .with_context(|| format!("cannot write {}, where what came before stays", self.partial.display()))
     }
 }
 
 impl Drop for LiveRecording {
     fn drop(&mut self) {
         // Gone already where it was finished.
-        let _ = std::fs::remove_file(&self.partial);
+        if !self.is_broken {
+            let _ = std::fs::remove_file(&self.partial);
+        }
     }
 }

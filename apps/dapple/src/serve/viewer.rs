@@ -16,11 +16,18 @@ const HELLO_TIMEOUT: Duration = Duration::from_secs(5);
 const SEND_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Talks to a viewer until one of both ends it.
-pub(crate) async fn talk(hub: SharedHub, mut out: impl Outbound, mut inbound: impl Inbound) {
-    match join(&hub, &out, &mut inbound).await {
+pub(crate) async fn talk(
+    hub: SharedHub,
+    mut out: impl Outbound,
+    mut inbound: impl Inbound,
+    is_foreign: bool,
+) {
+    match join(&hub, &out, &mut inbound, is_foreign).await {
         Ok(link) => {
+            // However this ends, its place is free then.
+            let place = Place { hub: &hub, link };
             let refusal = converse(&hub, link, &mut out, &mut inbound).await;
-            hub.host().leave(link, hub.now_us());
+            drop(place);
             tracing::debug!(viewer = link.viewer, connection = link.connection, reason = ?refusal, "left");
             if let Some(refusal) = refusal {
                 refuse(&mut out, refusal).await;
@@ -36,13 +43,30 @@ pub(crate) async fn talk(hub: SharedHub, mut out: impl Outbound, mut inbound: im
     out.close().await;
 }
 
+/// A viewer's place among those that are connected.
+struct Place<'a> {
+    hub: &'a Hub,
+    link: Link,
+}
+
+impl Drop for Place<'_> {
+    fn drop(&mut self) {
+        self.hub.host().leave(self.link, self.hub.now_us());
+    }
+}
+
 async fn refuse(out: &mut impl Outbound, refusal: Refusal) {
     let text = FromHost::Refused(refusal).to_text();
     let _ = tokio::time::timeout(SEND_TIMEOUT, out.send_text(text.into())).await;
 }
 
 /// Waits for a hello and lets its viewer in.
-async fn join<O: Outbound>(hub: &Hub, _out: &O, inbound: &mut impl Inbound) -> Result<Link, Option<Refusal>> {
+async fn join<O: Outbound>(
+    hub: &Hub,
+    _out: &O,
+    inbound: &mut impl Inbound,
+    is_foreign: bool,
+) -> Result<Link, Option<Refusal>> {
     let malformed = |message: String| Some(Refusal { reason: Reason::Malformed, message });
     let message = tokio::time::timeout(HELLO_TIMEOUT, inbound.receive()).await.map_err(|_| {
         let message = format!("no hello within {} s", HELLO_TIMEOUT.as_secs());
@@ -60,7 +84,7 @@ async fn join<O: Outbound>(hub: &Hub, _out: &O, inbound: &mut impl Inbound) -> R
         FromViewer::Hello(hello) => hello,
         _ => return Err(malformed("the first message must be a hello".to_owned())),
     };
-    let arrival = hub.arrival(O::IS_RELIABLE).map_err(|error| {
+    let arrival = hub.arrival(O::IS_RELIABLE, is_foreign).map_err(|error| {
         tracing::error!("the system gives no random numbers: {error}");
         Some(Refusal { reason: Reason::Closing, message: "the host cannot let anyone in".to_owned() })
     })?;
@@ -121,7 +145,13 @@ async fn receive_all(hub: &Hub, link: Link, inbound: &mut impl Inbound, heard: &
             Ok(None) | Err(LinkError::Ended(_)) => return None,
             Err(LinkError::Refused(message)) => return Some(Refusal { reason: Reason::Malformed, message }),
         };
-        if let Err(refusal) = hub.host().receive(link, &text, hub.now_us()) {
+        if let Err(refusal) = hub.host().announce(link, hub.now_us()) {
+            return Some(refusal);
+        }
+        // Read without the lock that everyone waits for.
+        let message = FromViewer::parse(&text)
+            .map_err(|error| Refusal { reason: Reason::Malformed, message: error.to_string() });
+        if let Err(refusal) = hub.host().hear(link, message, hub.now_us()) {
             return Some(refusal);
         }
         heard.notify_one();

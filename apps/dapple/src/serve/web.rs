@@ -121,11 +121,22 @@ async fn scene_answer(State(shared): State<Shared>, Path(name): Path<String>, as
     }
 }
 
+/// Whether a page of another host asks: browsers name it, and nobody else does.
+fn is_foreign(headers: &HeaderMap) -> bool {
+    let Some(origin) = headers.get(header::ORIGIN) else { return false };
+    let host = headers.get(header::HOST).map(HeaderValue::as_bytes).unwrap_or_default();
+    let origin = origin.as_bytes();
+    let own = origin.strip_prefix(b"http://").or(origin.strip_prefix(b"https://"));
+    own != Some(host)
+}
+
 async fn live_answer(
     State(shared): State<Shared>,
     Extension(permit): Extension<Permit>,
+    headers: HeaderMap,
     upgrade: WebSocketUpgrade,
 ) -> Response {
+    let is_foreign = is_foreign(&headers);
     upgrade
         .max_message_size(MAX_FROM_VIEWER_BYTES)
         .max_frame_size(MAX_FROM_VIEWER_BYTES)
@@ -134,7 +145,7 @@ async fn live_answer(
         .max_write_buffer_size(1 << 20)
         .on_upgrade(async move |socket| {
             let (out, inbound) = ws::accepted(socket);
-            talk(shared.hub, out, inbound).await;
+            talk(shared.hub, out, inbound, is_foreign).await;
             drop(permit);
         })
 }
@@ -142,8 +153,12 @@ async fn live_answer(
 async fn work_answer(
     State(shared): State<Shared>,
     Extension(permit): Extension<Permit>,
+    headers: HeaderMap,
     upgrade: WebSocketUpgrade,
 ) -> Response {
+    if headers.contains_key(header::ORIGIN) {
+        return (StatusCode::FORBIDDEN, "workers are programs, not pages\n").into_response();
+    }
     let Some(hub) = shared.work else {
         let message = "this server traces by itself: start it with --workers to have others trace\n";
         return (StatusCode::NOT_FOUND, message).into_response();

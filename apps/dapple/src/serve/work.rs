@@ -1,10 +1,11 @@
 //! The host's side of workers: steps down, light up, put together.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use dapple_scene::Edits;
+use dapple_server::shards::MergeError;
 use dapple_session::host::{Access, Tick, hex};
 use dapple_session::work::{FromWorker, Setup, Step, StepDone, ToWorker, WorkerHello};
 use dapple_session::{Assembled, Assembly, LightHead, LookCamera, PROTOCOL, Reason, Refusal};
@@ -16,8 +17,17 @@ use crate::transport::{Inbound, LinkError, Message, Outbound};
 /// A hello must come within this time.
 const HELLO_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// A worker that says nothing for so long is taken for dead. The first light of a large scene takes its time.
-const SILENCE: Duration = Duration::from_secs(600);
+/// The first light of a large scene takes its time.
+const FIRST_LIGHT: Duration = Duration::from_secs(3600);
+
+/// After that a worker answers every step: one that says nothing for so long is taken for dead.
+const SILENCE: Duration = Duration::from_secs(20);
+
+/// Workers that nobody needs are given a step this often, microseconds.
+const COMPANY_EVERY_US: u64 = 1_000_000;
+
+/// Steps that a worker may miss before the others no longer wait for it.
+const MOST_MISSED: u32 = 3;
 
 /// The part of the program that workers talk to.
 pub(crate) struct WorkHub {
@@ -26,8 +36,16 @@ pub(crate) struct WorkHub {
     token: Option<String>,
     steps: watch::Sender<Option<Arc<WorkStep>>>,
     news: Mutex<Sender<(u32, WorkNews)>>,
-    /// Counts the connections of each part: the newest counts.
-    connections: Mutex<Vec<u64>>,
+    seats: Mutex<Vec<Seat>>,
+}
+
+/// Who lights a part.
+#[derive(Clone, Default)]
+struct Seat {
+    /// Counts its connections: the newest counts.
+    connection: u64,
+    /// Why the newest must go.
+    refusal: Option<Refusal>,
 }
 
 /// A step for all workers.
@@ -61,7 +79,7 @@ impl WorkHub {
             token,
             steps: watch::Sender::new(None),
             news: Mutex::new(sender),
-            connections: Mutex::new(vec![0; parts as usize]),
+            seats: Mutex::new(vec![Seat::default(); parts as usize]),
         };
         (hub, receiver)
     }
@@ -100,8 +118,8 @@ impl WorkHub {
                 "the worker has loaded another scene than this host lights".to_owned(),
             );
         }
-        let mut connections = self.connections.lock().unwrap_or_else(PoisonError::into_inner);
-        let parts = connections.len() as u32;
+        let mut seats = self.seats();
+        let parts = seats.len() as u32;
         if hello.of != parts || hello.shard >= parts {
             return refuse(
                 Reason::Malformed,
@@ -112,13 +130,31 @@ impl WorkHub {
                 ),
             );
         }
-        let connection = &mut connections[hello.shard as usize];
-        *connection += 1;
-        Ok(*connection)
+        let seat = &mut seats[hello.shard as usize];
+        *seat = Seat { connection: seat.connection + 1, refusal: None };
+        Ok(seat.connection)
+    }
+
+    fn seats(&self) -> MutexGuard<'_, Vec<Seat>> {
+        self.seats.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn is_newest(&self, shard: u32, connection: u64) -> bool {
-        self.connections.lock().unwrap_or_else(PoisonError::into_inner)[shard as usize] == connection
+        self.seats()[shard as usize].connection == connection
+    }
+
+    fn let_go(&self, shard: u32, refusal: Refusal) {
+        self.seats()[shard as usize].refusal = Some(refusal);
+    }
+
+    /// Why a connection must end, if it must.
+    fn end_of(&self, shard: u32, connection: u64) -> Option<Refusal> {
+        let seat = self.seats()[shard as usize].clone();
+        if seat.connection == connection {
+            return seat.refusal;
+        }
+        let message = "another worker lights this part now".to_owned();
+        Some(Refusal { reason: Reason::Replaced, message })
     }
 }
 
@@ -206,16 +242,16 @@ async fn receive_light(hub: &WorkHub, shard: u32, connection: u64, inbound: &mut
     let malformed = |message: String| Refusal { reason: Reason::Malformed, message };
     let mut assembly = Assembly::default();
     let most = Limits::default().max_frame_bytes;
+    let mut patience = FIRST_LIGHT;
     loop {
-        let message = match tokio::time::timeout(SILENCE, inbound.receive()).await {
+        let message = match tokio::time::timeout(patience, inbound.receive()).await {
             Ok(Ok(Some(message))) => message,
             Ok(Ok(None)) => return ended("it closed the connection"),
             Ok(Err(error)) => return ended(&error.to_string()),
             Err(_) => return ended("it said nothing for too long"),
         };
-        if !hub.is_newest(shard, connection) {
-            let message = "another worker lights this part now".to_owned();
-            return Refusal { reason: Reason::Replaced, message };
+        if let Some(refusal) = hub.end_of(shard, connection) {
+            return refusal;
         }
         match message {
             Message::Bytes(bytes) => {
@@ -231,7 +267,10 @@ async fn receive_light(hub: &WorkHub, shard: u32, connection: u64, inbound: &mut
                 }
             }
             Message::Text(text) => match FromWorker::parse(&text) {
-                Ok(FromWorker::Done(done)) => hub.tell(shard, WorkNews::Done(done)),
+                Ok(FromWorker::Done(done)) => {
+                    patience = SILENCE;
+                    hub.tell(shard, WorkNews::Done(done));
+                }
                 Ok(FromWorker::Hello(_)) => return malformed("a second hello".to_owned()),
                 Err(error) => return malformed(error.to_string()),
             },
@@ -244,14 +283,34 @@ pub(crate) struct Workforce {
     hub: Arc<WorkHub>,
     news: Receiver<(u32, WorkNews)>,
     edits: Arc<Edits>,
-    /// Of each part, whether a worker is there and its last step.
-    parts: Vec<Option<StepDone>>,
+    parts: Vec<Part>,
+    /// When workers that nobody needs were last given a step.
+    kept_company_us: u64,
+}
+
+/// One part of the scene.
+#[derive(Clone, Copy, Default)]
+struct Part {
+    is_present: bool,
+    /// Whether it has ever had light.
+    has_begun: bool,
+    /// Its worker's last step; none before the first.
+    done: Option<StepDone>,
+    /// Steps that its worker did not make in time, in a row.
+    missed: u32,
+}
+
+/// What a worker has sent.
+pub(crate) enum Sent {
+    /// It begins: what it sends next builds on nothing.
+    Anew,
+    Frame(Vec<u8>),
 }
 
 /// What a step of all workers came to.
 #[derive(Default)]
 pub(crate) struct Work {
-    pub(crate) light: Vec<(u32, Vec<u8>)>,
+    pub(crate) light: Vec<(u32, Sent)>,
     pub(crate) rays: u64,
     pub(crate) changed: u32,
     pub(crate) waiting: u32,
@@ -260,8 +319,14 @@ pub(crate) struct Work {
 
 impl Workforce {
     pub(crate) fn new(hub: Arc<WorkHub>, news: Receiver<(u32, WorkNews)>, edits: Edits) -> Workforce {
-        let parts = hub.connections.lock().unwrap_or_else(PoisonError::into_inner).len();
-        Workforce { hub, news, edits: Arc::new(edits), parts: vec![None; parts] }
+        let parts = hub.seats().len();
+        Workforce {
+            hub,
+            news,
+            edits: Arc::new(edits),
+            parts: vec![Part::default(); parts],
+            kept_company_us: 0,
+        }
     }
 
     pub(crate) fn set_edits(&mut self, edits: Edits) {
@@ -273,8 +338,38 @@ impl Workforce {
         self.parts.len()
     }
 
-    /// Takes what has come while no step is made.
-    pub(crate) fn idle(&mut self) -> Vec<(u32, Vec<u8>)> {
+    /// How many workers are there.
+    pub(crate) fn present(&self) -> usize {
+        self.parts.iter().filter(|part| part.is_present).count()
+    }
+
+    /// How many parts have had light.
+    pub(crate) fn begun(&self) -> usize {
+        self.parts.iter().filter(|part| part.has_begun).count()
+    }
+
+    /// Whether all workers that are there have light.
+    pub(crate) fn is_warm(&self) -> bool {
+        self.parts.iter().all(|part| !part.is_present || part.done.is_some())
+    }
+
+    /// Ends a worker's connection, because what it sends does not fit.
+    pub(crate) fn let_go(&self, shard: u32, error: &MergeError) {
+        // Other points than the host expects will not fit the next time either.
+        let reason = match error {
+            MergeError::Layout(_) => Reason::Scene,
+            MergeError::Receive(_) => Reason::Closing,
+        };
+        let message = format!("the light of part {} does not fit that of the others: {error}", shard + 1);
+        self.hub.let_go(shard, Refusal { reason, message });
+    }
+
+    /// Takes what has come while nobody needs light. Workers hear of the host now and then all the same, and keep up with it.
+    pub(crate) fn idle(&mut self, tick: &Tick) -> Vec<(u32, Sent)> {
+        if tick.stamp_us.saturating_sub(self.kept_company_us) >= COMPANY_EVERY_US {
+            self.kept_company_us = tick.stamp_us;
+            self.hub.step(tick, self.edits.clone(), Vec::new());
+        }
         let mut work = Work::default();
         while let Ok((shard, news)) = self.news.try_recv() {
             self.take(shard, news, &mut work);
@@ -282,48 +377,49 @@ impl Workforce {
         work.light
     }
 
-    fn take(&mut self, shard: u32, news: WorkNews, work: &mut Work) {
-        let part = &mut self.parts[shard as usize];
-        match news {
-            WorkNews::Joined => *part = Some(StepDone::default()),
-            WorkNews::Left => *part = None,
-            WorkNews::Light(frame) => work.light.push((shard, frame)),
-            WorkNews::Done(done) => {
-                work.rays += done.rays;
-                work.changed += done.changed;
-                *part = Some(done);
-            }
-        }
-    }
-
-    /// Whether all workers that are there have light.
-    pub(crate) fn is_warm(&self) -> bool {
-        self.parts.iter().flatten().all(|done| done.stamp_us > 0)
-    }
-
-    /// How many workers are there.
-    pub(crate) fn present(&self) -> usize {
-        self.parts.iter().flatten().count()
-    }
-
     /// Has all workers make a step, and waits for those that are in time. What comes later counts for a later step.
     pub(crate) fn step(&mut self, tick: &Tick, looks: Vec<LookCamera>, patience: Duration) -> Work {
+        self.kept_company_us = tick.stamp_us;
         self.hub.step(tick, self.edits.clone(), looks);
         let until = Instant::now() + patience;
         let mut work = Work::default();
+        // One that makes its first light, or is late again and again, is not waited for.
+        let is_due = |part: &Part| {
+            let is_behind = part.done.is_some_and(|done| done.stamp_us < tick.stamp_us);
+            part.is_present && is_behind && part.missed < MOST_MISSED
+        };
         loop {
             let left = until.saturating_duration_since(Instant::now());
-            let is_due = |done: &StepDone| done.stamp_us < tick.stamp_us;
-            // Without anyone to wait for, what has come is taken all the same.
-            let waits = self.parts.iter().flatten().any(is_due);
+            let waits = self.parts.iter().any(is_due);
             let news = if waits { self.news.recv_timeout(left).ok() } else { self.news.try_recv().ok() };
             let Some((shard, news)) = news else { break };
             self.take(shard, news, &mut work);
         }
-        for done in self.parts.iter().flatten() {
-            work.waiting += done.waiting;
-            work.points += done.points;
+        for part in &mut self.parts {
+            let Some(done) = part.done else { continue };
+            if part.is_present && done.stamp_us < tick.stamp_us {
+                part.missed = part.missed.saturating_add(1);
+            }
+            work.waiting = work.waiting.saturating_add(done.waiting);
+            work.points = work.points.saturating_add(done.points);
         }
         work
+    }
+
+    fn take(&mut self, shard: u32, news: WorkNews, work: &mut Work) {
+        let part = &mut self.parts[shard as usize];
+        match news {
+            WorkNews::Joined => {
+                *part = Part { is_present: true, has_begun: part.has_begun, ..Part::default() };
+                work.light.push((shard, Sent::Anew));
+            }
+            WorkNews::Left => part.is_present = false,
+            WorkNews::Light(frame) => work.light.push((shard, Sent::Frame(frame))),
+            WorkNews::Done(done) => {
+                work.rays = work.rays.saturating_add(done.rays);
+                work.changed = work.changed.saturating_add(done.changed);
+                (part.done, part.has_begun, part.missed) = (Some(done), true, 0);
+            }
+        }
     }
 }

@@ -214,7 +214,11 @@ impl Feed {
                 format!("server here: {:.0} ms, {} traced", 1e3 * live.step_seconds, live.traced)
             }
             Feed::Remote(remote) => match remote.state() {
-                LinkState::Connected => "live".to_owned(),
+                LinkState::Connected => match remote.figures().status.started {
+                    // Before the first status nothing is known.
+                    0 | 1000 => "live".to_owned(),
+                    mille => format!("the host makes its light: {} %", mille / 10),
+                },
                 LinkState::Connecting => "connecting".to_owned(),
                 LinkState::Waiting(_, seconds) => format!("broken, again in {seconds:.1} s"),
                 LinkState::Ended(_) => "ended".to_owned(),

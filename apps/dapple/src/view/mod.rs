@@ -55,6 +55,12 @@ pub(crate) fn run(args: &ViewArgs) -> Result<()> {
     window::run(opening, args.size, outputs, args.paused, args.time)
 }
 
+/// A token in an address, as pages take it.
+fn token_of(url: &str) -> Option<String> {
+    let query = url.split('#').next()?.split_once('?')?.1;
+    query.split('&').find_map(|part| part.strip_prefix("token=")).map(str::to_owned)
+}
+
 fn check(args: &ViewArgs) -> Result<()> {
     if !(args.time.is_finite() && args.time >= 0.0) {
         bail!("--time is {}, must be 0 or more seconds", args.time);
@@ -98,8 +104,12 @@ fn open(args: &ViewArgs) -> Result<Opening> {
                 (Some(address), _) => {
                     let bits_per_s = args.step.budget.map(|rate| rate.0);
                     let seed = u64::from(std::process::id());
-                    let config =
-                        GuestConfig { token: args.token.clone(), bits_per_s, seed, ..GuestConfig::default() };
+                    let config = GuestConfig {
+                        token: args.token.clone().or_else(|| token_of(url)),
+                        bits_per_s,
+                        seed,
+                        ..GuestConfig::default()
+                    };
                     Feed::Remote(Remote::join(address, &scene, config)?)
                 }
                 (None, Some(pieces)) => Feed::Recorded(Player::incoming(pieces, &scene)),

@@ -18,7 +18,7 @@ const MAX_WAITING: usize = 512;
 /// A session that is kept up by a thread of its own until this is dropped.
 pub(super) struct Remote {
     shared: Arc<SharedGuest>,
-    frames: Receiver<Vec<u8>>,
+    frames: Receiver<Piece>,
     state: watch::Receiver<LinkState>,
     stop: watch::Sender<bool>,
     thread: Option<std::thread::JoinHandle<()>>,
@@ -28,6 +28,13 @@ pub(super) struct Remote {
     /// Frames came that nobody had room for.
     has_overflown: Arc<AtomicBool>,
     rejected: Receiver<String>,
+}
+
+/// What comes for the viewer.
+pub(super) enum Piece {
+    Frame(Vec<u8>),
+    /// What is held is another stream's from here on.
+    Anew,
 }
 
 /// What an overlay says of a session.
@@ -57,7 +64,12 @@ impl Remote {
             let on_news = |_: &mut Guest, news| match news {
                 News::Light(frame) if !frame.is_empty() => {
                     // Who listens no more has ended; who does not listen now will hear of it.
-                    if frame_sender.try_send(frame).is_err() {
+                    if frame_sender.try_send(Piece::Frame(frame)).is_err() {
+                        overflows.store(true, Ordering::Relaxed);
+                    }
+                }
+                News::Welcome(false) => {
+                    if frame_sender.try_send(Piece::Anew).is_err() {
                         overflows.store(true, Ordering::Relaxed);
                     }
                 }
@@ -84,11 +96,12 @@ impl Remote {
     }
 
     /// Frames that have come.
-    pub(super) fn take_frames(&mut self) -> Vec<Vec<u8>> {
-        let frames = self.frames.try_iter().collect();
+    pub(super) fn take_frames(&mut self) -> Vec<Piece> {
+        let mut frames: Vec<Piece> = self.frames.try_iter().collect();
         if self.has_overflown.swap(false, Ordering::Relaxed) {
             // What follows builds on what was dropped.
             self.shared.lock().forget_light();
+            frames.push(Piece::Anew);
         }
         frames
     }
@@ -127,7 +140,7 @@ impl Remote {
     pub(super) fn send(&mut self, event: Event) -> Result<(), &'static str> {
         let mut guest = self.shared.lock();
         match guest.role() {
-            Some(Role::View) => return Err("this viewer may only look: give a token with ?token=…"),
+            Some(Role::View) => return Err("this viewer may only look: --token gives it more rights"),
             None => return Err("not connected"),
             Some(Role::Interact) => {}
         }

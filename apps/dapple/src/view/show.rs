@@ -18,6 +18,7 @@ use super::feed::{Feed, group_of};
 use super::live::Live;
 use super::quality::Quality;
 use super::record_path::PathRecorder;
+use super::remote::Piece;
 use super::steer::Steering;
 use crate::args::LightArgs;
 use crate::light::{scene_seconds, server_config};
@@ -202,7 +203,14 @@ impl Show {
         self.clock.set_playing(playing);
         self.clock.seek(time_s);
         self.rejected = remote.rejected().or(self.rejected.take());
-        for frame in remote.take_frames() {
+        for piece in remote.take_frames() {
+            let frame = match piece {
+                Piece::Frame(frame) => frame,
+                Piece::Anew => {
+                    self.viewer.outdate();
+                    continue;
+                }
+            };
             let start = Instant::now();
             let applied = self.viewer.receive(&frame, now_s);
             let held = self.viewer.held().map(|(group, epoch)| Held { group, epoch });

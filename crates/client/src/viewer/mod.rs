@@ -274,6 +274,11 @@ impl Viewer {
         self.light.subscriber.store()
     }
 
+    /// What it holds is another stream's from now on: it stays to be seen until the next snapshot, of whatever group, replaces it.
+    pub fn outdate(&mut self) {
+        self.light.subscriber.outdate();
+    }
+
     /// Group and epoch of what it holds; nothing before the first snapshot.
     pub fn held(&self) -> Option<(u64, u64)> {
         self.light.subscriber.group().zip(self.light.subscriber.epoch())

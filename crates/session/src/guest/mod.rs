@@ -63,7 +63,8 @@ pub enum GuestError {
 pub enum News {
     /// Nothing to act on.
     Nothing,
-    /// The host let it in; true if it goes on from before.
+    /// The host let it in; true if light goes on from what is held. If not, what is held stays to be looked at, and whoever holds it must take
+    /// the next snapshot whatever its group is (`Subscriber::outdate`).
     Welcome(bool),
     /// The scene's state changed: see [`Guest::edits`] and [`Guest::clock`].
     State,
@@ -129,10 +130,10 @@ impl Guest {
     pub fn connected(&mut self, now_us: u64) {
         (self.is_connected, self.hello, self.welcome) = (true, None, None);
         (self.look.came, self.look.lost, self.said_us) = (0, 0, now_us);
+        (self.look.heard_us, self.heard_at_us) = (0, now_us);
         // Versions count anew with another host; what was changed stays until the state comes.
         self.version = 0;
         (self.assembly, self.newest) = (Assembly::default(), None);
-        self.timing.connected();
         self.pending.connected();
     }
 
@@ -151,14 +152,18 @@ impl Guest {
         Ok(match FromHost::parse(text)? {
             FromHost::Welcome(welcome) => {
                 self.backoff.reset();
-                let resumed = self.key.as_deref() == Some(&welcome.key);
-                if !resumed {
+                if self.key.as_deref() != Some(&welcome.key) {
                     self.pending.renumber();
+                }
+                let goes_on = welcome.goes_on;
+                if !goes_on {
+                    self.held = None;
+                    self.timing = Timing::default();
                 }
                 self.pending.heard(welcome.heard);
                 self.key = Some(welcome.key.clone());
                 self.welcome = Some(welcome);
-                News::Welcome(resumed)
+                News::Welcome(goes_on)
             }
             FromHost::Refused(refusal) => return Err(GuestError::Refused(refusal)),
             FromHost::State { version, clock, edits } => {
@@ -211,9 +216,11 @@ impl Guest {
         };
         Ok(match self.assembly.push(head, piece, most) {
             Assembled::Part => News::Nothing,
+            Assembled::Never if head.total as usize > most => {
+                return Err(MessageError::TooLong { bytes: head.total as usize, limit: most }.into());
+            }
             Assembled::Never => {
-                self.look.lost += 1;
-                News::Nothing
+                return Err(MessageError::Light("a piece is not one of its frame's").into());
             }
             Assembled::Whole(head, frame) => {
                 self.timing.light(&head, now_us);
@@ -272,7 +279,8 @@ impl Guest {
             };
             return Some(FromViewer::Hello(hello).to_text());
         }
-        if let Some((number, event)) = self.pending.next(now_us) {
+        let per_s = self.welcome.as_ref().map_or(1, |welcome| welcome.events_per_s);
+        if let Some((number, event)) = self.pending.next(now_us, per_s) {
             return Some(FromViewer::Event { number, event }.to_text());
         }
         self.next_look(now_us)

@@ -24,11 +24,13 @@ pub(super) struct Pending {
     /// Of the events in order, how many have been said since `said_us`.
     said: usize,
     said_us: u64,
+    /// When the next may be said.
+    free_us: u64,
 }
 
 impl Default for Pending {
     fn default() -> Self {
-        Pending { events: VecDeque::new(), next_number: 1, said: 0, said_us: 0 }
+        Pending { events: VecDeque::new(), next_number: 1, said: 0, said_us: 0, free_us: 0 }
     }
 }
 
@@ -72,7 +74,20 @@ impl Pending {
         self.next_number = self.next_number.max(number.saturating_add(1));
     }
 
-    pub(super) fn next(&mut self, now_us: u64) -> Option<(u32, Event)> {
+    /// The next to be said, no more than so many a second: what is said too fast would be rejected.
+    pub(super) fn next(&mut self, now_us: u64, per_s: u32) -> Option<(u32, Event)> {
+        let apart_us = 1_000_000 / u64::from(per_s.max(1));
+        // Half a second's worth may be said at once.
+        self.free_us = self.free_us.max(now_us.saturating_sub(500_000));
+        if self.free_us > now_us {
+            return None;
+        }
+        let next = self.next_unpaced(now_us)?;
+        self.free_us += apart_us;
+        Some(next)
+    }
+
+    fn next_unpaced(&mut self, now_us: u64) -> Option<(u32, Event)> {
         if self.said > 0 && now_us.saturating_sub(self.said_us) >= AGAIN_US {
             self.said = 0;
         }
@@ -116,20 +131,21 @@ mod tests {
         for _ in 0..3 {
             assert!(pending.push(Event::Play));
         }
-        let said: Vec<u32> = std::iter::from_fn(|| pending.next(0)).map(|(number, _)| number).collect();
+        let said: Vec<u32> =
+            std::iter::from_fn(|| pending.next_unpaced(0)).map(|(number, _)| number).collect();
         assert_eq!(said, [1, 2, 3]);
         pending.heard(1);
-        assert!(pending.next(AGAIN_US - 1).is_none());
-        assert_eq!(pending.next(AGAIN_US).unwrap().0, 2);
+        assert!(pending.next_unpaced(AGAIN_US - 1).is_none());
+        assert_eq!(pending.next_unpaced(AGAIN_US).unwrap().0, 2);
         pending.connected();
-        assert_eq!(pending.next(AGAIN_US).unwrap().0, 2);
+        assert_eq!(pending.next_unpaced(AGAIN_US).unwrap().0, 2);
         pending.renumber();
         pending.connected();
-        assert_eq!(pending.next(AGAIN_US).unwrap().0, 1);
+        assert_eq!(pending.next_unpaced(AGAIN_US).unwrap().0, 1);
         pending.heard(2);
         assert!(pending.is_empty());
         assert!(pending.push(Event::Pause));
-        assert_eq!(pending.next(0).unwrap().0, 3);
+        assert_eq!(pending.next_unpaced(0).unwrap().0, 3);
     }
 
     #[test]
@@ -138,11 +154,25 @@ mod tests {
         for time in 0..1000 {
             assert!(pending.push(Event::Seek { time_s: f64::from(time) }));
         }
-        assert_eq!(pending.next(0), Some((1, Event::Seek { time_s: 999.0 })));
+        assert_eq!(pending.next_unpaced(0), Some((1, Event::Seek { time_s: 999.0 })));
         // What has been said stays as it is.
         assert!(pending.push(Event::Seek { time_s: 1.0 }));
-        assert_eq!(pending.next(0), Some((2, Event::Seek { time_s: 1.0 })));
+        assert_eq!(pending.next_unpaced(0), Some((2, Event::Seek { time_s: 1.0 })));
         let taken = (0..1000).filter(|i| pending.push(if i % 2 == 0 { Event::Play } else { Event::Pause }));
         assert_eq!(taken.count(), MAX_PENDING - 2);
+    }
+
+    #[test]
+    fn events_are_said_no_faster_than_they_are_taken() {
+        let mut pending = Pending::default();
+        let mut said = 0;
+        for ms in 0..10_000u64 {
+            pending.push(if ms % 2 == 0 { Event::Play } else { Event::Pause });
+            while let Some((number, _)) = pending.next(1_000_000 + ms * 1000, 60) {
+                said += 1;
+                pending.heard(number);
+            }
+        }
+        assert!((595..=635).contains(&said), "{said} in ten seconds");
     }
 }

@@ -38,11 +38,6 @@ pub(super) struct Timing {
 }
 
 impl Timing {
-    /// A new connection may lead to another host.
-    pub(super) fn connected(&mut self) {
-        *self = Timing { shown: self.shown, ..Timing::default() };
-    }
-
     pub(super) fn round_trip(&mut self, round_trip_us: u64) {
         self.round_trip_us = round_trip_us;
     }

@@ -36,15 +36,16 @@ impl Access {
         token.is_some_and(|token| self.tokens.iter().any(|(known, _)| equal(known, token)))
     }
 
-    pub(super) fn role(&self, token: Option<&str>) -> Result<Role, Refusal> {
+    pub(super) fn role(&self, token: Option<&str>, is_foreign: bool) -> Result<Role, Refusal> {
         let refusal = |message: &str| Refusal::new(Reason::Token, message);
         if self.tokens.is_empty() {
-            return Ok(Role::Interact);
+            // Any page that is open in a browser could be the one that asks.
+            return Ok(if is_foreign { Role::View } else { Role::Interact });
         }
         let Some(token) = token else {
-            return self
-                .open_role()
-                .ok_or_else(|| refusal("this host asks for a token: add ?token=… to its address"));
+            return self.open_role().ok_or_else(|| {
+                refusal("this host asks for a token: ?token=… in a page's address, --token for dapple view")
+            });
         };
         let roles = self.tokens.iter().filter(|(known, _)| equal(known, token)).map(|(_, role)| *role);
         roles.max().ok_or_else(|| refusal("the token is not one of this host's"))
@@ -62,11 +63,13 @@ mod tests {
 
     #[test]
     fn tokens_give_roles() {
-        let role =
-            |access: &Access, token: Option<&str>| access.role(token).map_err(|refusal| refusal.reason);
+        let role = |access: &Access, token: Option<&str>| {
+            access.role(token, false).map_err(|refusal| refusal.reason)
+        };
         let open = Access::default();
         assert_eq!(role(&open, None), Ok(Role::Interact));
         assert_eq!(role(&open, Some("anything")), Ok(Role::Interact));
+        assert_eq!(open.role(None, true).ok(), Some(Role::View), "a page of somebody else's");
         let guarded = Access::new(vec![("look".into(), Role::View), ("touch".into(), Role::Interact)]);
         assert_eq!(role(&guarded, None), Err(Reason::Token));
         assert_eq!(role(&guarded, Some("look")), Ok(Role::View));

@@ -9,7 +9,7 @@ mod viewer;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-use dapple_scene::{Edits, Scene};
+use dapple_scene::{Edit, Edits, Scene};
 use dapple_stream::Frame;
 
 pub use access::Access;
@@ -31,7 +31,7 @@ pub struct HostConfig {
     pub max_viewers: u32,
     /// Most events a second of one viewer, on average; four seconds' worth may come at once. Default 60.
     pub events_per_s: u32,
-    /// Most messages a second of one viewer, on average; more end its connection. Default 400.
+    /// Most messages a second of one viewer, on average; more end its connection. Default 150.
     pub messages_per_s: u32,
     /// After so long without a message a viewer is let go, microseconds. Default 15 s.
     pub silence_us: u64,
@@ -54,7 +54,7 @@ impl Default for HostConfig {
             hz: 30.0,
             max_viewers: 2000,
             events_per_s: 60,
-            messages_per_s: 400,
+            messages_per_s: 150,
             silence_us: 15_000_000,
             resume_us: 60_000_000,
             window_us: 500_000,
@@ -81,6 +81,8 @@ pub struct Arrival {
     pub key: String,
     /// Whether what is sent comes, once and in order, unless the connection breaks.
     pub is_reliable: bool,
+    /// Whether it comes from a page of somebody else's: without a token it may look at most.
+    pub is_foreign: bool,
     /// Microseconds since 1970.
     pub unix_us: u64,
 }
@@ -151,6 +153,9 @@ const MAX_AGES: usize = 1 << 16;
 /// Most events that wait for the next step.
 const MAX_QUEUED_EVENTS: usize = 4096;
 
+/// Most events that take effect in one step: each place costs a look at all nodes of the scene. The others wait for the next.
+const MAX_EVENTS_A_STEP: usize = 256;
+
 /// The server's end of all sessions.
 pub struct Host {
     config: HostConfig,
@@ -159,8 +164,8 @@ pub struct Host {
     state: SceneState,
     viewers: BTreeMap<u64, Viewer>,
     next_viewer: u64,
-    /// What came since the last step, by viewer and number; `None` for what was rejected as it came.
-    queue: VecDeque<(u64, u32, Option<Event>)>,
+    /// What came since the last step, by viewer and number.
+    queue: VecDeque<(u64, u32, Event)>,
     rungs: Vec<Rung>,
     /// The last step's message for those who get no light with it.
     tick: Option<Arc<[u8]>>,
@@ -238,7 +243,7 @@ impl Host {
                 ),
             ));
         }
-        let role = self.config.access.role(hello.token.as_deref())?;
+        let role = self.config.access.role(hello.token.as_deref(), arrival.is_foreign)?;
         let known = hello.key.as_deref().and_then(|key| {
             self.viewers.iter().find(|(_, viewer)| access::equal(&viewer.key, key)).map(|(id, _)| *id)
         });
@@ -260,7 +265,9 @@ impl Host {
         let rung = self.rung_for(hello.bits_per_s);
         let bits_per_s = self.config.rungs[rung];
         let viewer = self.viewers.get_mut(&id).expect("it was found or inserted");
-        viewer.connect(role, rung, hello.held, arrival.is_reliable, now_us);
+        // Light of another stream, or of another host, has epochs of its own.
+        let goes_on = known.is_some() && viewer.rung == rung;
+        viewer.connect(role, rung, hello.held.filter(|_| goes_on), arrival.is_reliable, now_us);
         viewer.tell(&FromHost::Welcome(Welcome {
             protocol: PROTOCOL,
             viewer: id,
@@ -268,6 +275,7 @@ impl Host {
             role,
             hz: self.config.hz,
             heard: viewer.events_done,
+            goes_on,
             bits_per_s,
             events_per_s: self.config.events_per_s,
             clock_us: now_us,
@@ -296,12 +304,40 @@ impl Host {
         self.config.rungs.iter().position(within).unwrap_or(self.config.rungs.len() - 1)
     }
 
-    /// Takes a text of a viewer.
+    /// Takes a text of a viewer: [`Host::announce`], reading and [`Host::hear`] in one.
     ///
     /// # Errors
     /// The refusal to be sent before its connection is closed; the viewer has left then.
     pub fn receive(&mut self, link: Link, text: &str, now_us: u64) -> Result<(), Refusal> {
-        let taken = self.take(link, text, now_us);
+        self.announce(link, now_us)?;
+        let message = FromViewer::parse(text);
+        self.hear(link, message.map_err(|error| malformed(&error)), now_us)
+    }
+
+    /// A message has come that has not been read yet: it counts whatever it is.
+    ///
+    /// # Errors
+    /// As [`Host::receive`].
+    pub fn announce(&mut self, link: Link, now_us: u64) -> Result<(), Refusal> {
+        let counted = self.count(link, now_us);
+        self.expel_unless(counted, link, now_us)
+    }
+
+    /// Takes a message that was read ([`FromViewer::parse`]), or could not be.
+    ///
+    /// # Errors
+    /// As [`Host::receive`].
+    pub fn hear(
+        &mut self,
+        link: Link,
+        message: Result<FromViewer, Refusal>,
+        now_us: u64,
+    ) -> Result<(), Refusal> {
+        let taken = message.and_then(|message| self.take(link, message, now_us));
+        self.expel_unless(taken, link, now_us)
+    }
+
+    fn expel_unless(&mut self, taken: Result<(), Refusal>, link: Link, now_us: u64) -> Result<(), Refusal> {
         if taken.is_err() {
             self.counts.expelled += 1;
             self.leave(link, now_us);
@@ -309,20 +345,22 @@ impl Host {
         taken
     }
 
-    fn take(&mut self, link: Link, text: &str, now_us: u64) -> Result<(), Refusal> {
+    fn count(&mut self, link: Link, now_us: u64) -> Result<(), Refusal> {
         let Some(viewer) = connected(&mut self.viewers, link) else { return Ok(()) };
-        if !viewer.messages.take(now_us) {
-            let most = self.config.messages_per_s;
-            let message = format!("more than {most} messages a second: send less often");
-            return Err(Refusal::new(Reason::TooMany, message));
-        }
         viewer.last_message_us = now_us;
-        let message =
-            FromViewer::parse(text).map_err(|error| Refusal::new(Reason::Malformed, error.to_string()))?;
+        if viewer.messages.take(now_us) {
+            return Ok(());
+        }
+        let most = self.config.messages_per_s;
+        let message = format!("more than {most} messages a second: send less often");
+        Err(Refusal::new(Reason::TooMany, message))
+    }
+
+    fn take(&mut self, link: Link, message: FromViewer, now_us: u64) -> Result<(), Refusal> {
+        let Some(viewer) = connected(&mut self.viewers, link) else { return Ok(()) };
         match message {
-            FromViewer::Hello(_) => {
-                Err(Refusal::new(Reason::Malformed, "a second hello over the same connection"))
-            }
+            // Said again because the welcome took its time.
+            FromViewer::Hello(_) => Ok(()),
             FromViewer::Look(look) => {
                 if let Some(age_us) = viewer.look(&look, now_us)
                     && self.ages_us.len() < MAX_AGES
@@ -348,14 +386,14 @@ impl Host {
                     None
                 };
                 viewer.events_taken = number;
-                let event = if let Some(message) = refused {
-                    self.counts.rejected += 1;
-                    viewer.tell(&FromHost::Rejected { number, message });
-                    None
-                } else {
-                    Some(event)
+                let Some(message) = refused else {
+                    viewer.waiting += 1;
+                    self.queue.push_back((link.viewer, number, event));
+                    return Ok(());
                 };
-                self.queue.push_back((link.viewer, number, event));
+                self.counts.rejected += 1;
+                viewer.tell(&FromHost::Rejected { number, message });
+                viewer.deal(None);
                 Ok(())
             }
             FromViewer::Bye => {
@@ -412,20 +450,30 @@ impl Host {
             if now_us.saturating_sub(viewer.last_message_us) > silence_us && viewer.expelled.is_none() {
                 self.counts.expelled += 1;
                 let message = format!("no message for {} s", silence_us / 1_000_000);
-                viewer.expelled = Some(Refusal::new(Reason::Silent, message));
+                viewer.expel(Refusal::new(Reason::Silent, message), now_us);
             }
         }
         let mut batch = self.state.batch(now_us);
-        for (id, number, event) in self.queue.drain(..) {
-            let applied = event.map(|event| batch.apply(&self.scene, event));
+        let mut left = MAX_EVENTS_A_STEP;
+        let overtaken = overtaken(&self.queue);
+        for is_overtaken in overtaken {
+            if left == 0 {
+                break;
+            }
+            let Some((id, number, event)) = self.queue.pop_front() else { break };
+            let applied = if is_overtaken {
+                Ok(())
+            } else {
+                left -= 1;
+                batch.apply(&self.scene, event)
+            };
             match &applied {
-                Some(Ok(())) => self.counts.events += 1,
-                Some(Err(_)) => self.counts.rejected += 1,
-                None => {}
+                Ok(()) => self.counts.events += 1,
+                Err(_) => self.counts.rejected += 1,
             }
             if let Some(viewer) = self.viewers.get_mut(&id) {
-                viewer.events_done = viewer.events_done.max(number);
-                if let Some(Err(message)) = applied {
+                viewer.deal(Some(number));
+                if let Err(message) = applied {
                     viewer.tell(&FromHost::Rejected { number, message });
                 }
             }
@@ -527,6 +575,34 @@ impl Tick {
             offset: 0,
         }
     }
+}
+
+/// Of each event that waits, whether a later one of its node makes it not matter.
+fn overtaken(queue: &VecDeque<(u64, u32, Event)>) -> Vec<bool> {
+    let mut placed = std::collections::BTreeSet::new();
+    let mut overtaken: Vec<bool> = queue
+        .iter()
+        .rev()
+        .map(|(_, _, event)| match event {
+            Event::Edit { change: Edit::Place { node, .. } } => !placed.insert(*node),
+            Event::Edit { change: Edit::Release { node } } => {
+                placed.remove(node);
+                false
+            }
+            // What they do depends on what was before.
+            Event::Edit { change: Edit::Reset } | Event::Add { .. } => {
+                placed.clear();
+                false
+            }
+            _ => false,
+        })
+        .collect();
+    overtaken.reverse();
+    overtaken
+}
+
+fn malformed(error: &crate::MessageError) -> Refusal {
+    Refusal::new(Reason::Malformed, error.to_string())
 }
 
 fn connected(viewers: &mut BTreeMap<u64, Viewer>, link: Link) -> Option<&mut Viewer> {

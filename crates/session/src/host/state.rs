@@ -10,6 +10,9 @@ use crate::{Event, FromHost, SceneClock};
 /// Most edits that are kept to tell viewers what changed; who holds an older state gets all of it.
 const MAX_KEPT_EDITS: usize = 512;
 
+/// Most nodes that stand elsewhere than in the file, so that the whole state stays below what viewers take.
+const MAX_PLACED: usize = 8192;
+
 /// What can change of a scene, with its versions.
 pub(super) struct SceneState {
     edits: Edits,
@@ -124,6 +127,15 @@ impl Batch<'_> {
     }
 
     fn edit(&mut self, scene: &Scene, edit: &Edit) -> Result<(), String> {
+        let placed = &self.state.edits.placed;
+        if let Edit::Place { node, .. } = edit
+            && placed.len() >= MAX_PLACED
+            && !placed.contains_key(node)
+        {
+            return Err(format!(
+                "{MAX_PLACED} nodes stand elsewhere already, which is the most: release some first"
+            ));
+        }
         // What is told is what was applied, in its normal form.
         let applied = edit.normalized();
         self.state.edits.apply(scene, &applied).map_err(|error| error.to_string())?;

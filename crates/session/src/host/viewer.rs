@@ -37,6 +37,8 @@ pub(super) struct Viewer {
     /// Number of the last event that was taken, dealt with, and told to be.
     pub(super) events_taken: u32,
     pub(super) events_done: u32,
+    /// Events of it that wait for a step.
+    pub(super) waiting: u32,
     events_told: u32,
     pub(super) camera: Option<LookCamera>,
     /// Texts that wait.
@@ -87,6 +89,7 @@ impl Viewer {
             events: Bucket::new(config.events_per_s, now_us),
             events_taken: 0,
             events_done: 0,
+            waiting: 0,
             events_told: 0,
             camera: None,
             control: VecDeque::new(),
@@ -113,10 +116,20 @@ impl Viewer {
         self.connection = self.connection.wrapping_add(1);
         (self.role, self.rung, self.left_us, self.expelled) = (role, rung, None, None);
         (self.last_message_us, self.state_sent) = (now_us, 0);
+        if is_reliable {
+            // Nothing of an earlier connection comes after this.
+            self.look_number = 0;
+        }
         self.control.clear();
         // What was taken and not dealt with yet still will be.
         self.events_told = self.events_done;
         self.light = Sent { held, is_reliable, last_us: now_us, progress_us: now_us, ..Sent::default() };
+    }
+
+    /// Lets it go: its connection learns why when it asks what to do next.
+    pub(super) fn expel(&mut self, refusal: Refusal, now_us: u64) {
+        self.expelled.get_or_insert(refusal);
+        self.left_us.get_or_insert(now_us);
     }
 
     /// Queues a text.
@@ -126,10 +139,21 @@ impl Viewer {
         }
         if self.control.len() >= MAX_WAITING_TEXTS {
             let message = "the viewer does not take what it is sent: it was let go";
-            self.expelled.get_or_insert(Refusal::new(Reason::TooMany, message));
+            self.expel(Refusal::new(Reason::TooMany, message), self.last_message_us);
             return;
         }
         self.control.push_back(message.to_text().into());
+    }
+
+    /// One of its events that waited has been dealt with, or (`None`) one was as it came.
+    pub(super) fn deal(&mut self, number: Option<u32>) {
+        if let Some(number) = number {
+            self.waiting = self.waiting.saturating_sub(1);
+            self.events_done = self.events_done.max(number);
+        }
+        if self.waiting == 0 {
+            self.events_done = self.events_taken;
+        }
     }
 
     /// Tells which events have been dealt with, if that is news.
@@ -253,7 +277,7 @@ impl Sent {
 
     /// What a look says of the light that came.
     fn heard(&mut self, look: &Look, now_us: u64) {
-        if look.came >= self.came + PROGRESS_BYTES {
+        if look.came.saturating_sub(self.came) >= PROGRESS_BYTES {
             self.progress_us = now_us;
         }
         self.came = self.came.max(look.came);

@@ -42,6 +42,8 @@ pub(super) struct Drill {
     pub(super) store: PointStore,
     pub(super) peers: Vec<Peer>,
     pub(super) now_us: u64,
+    /// When the host's clock began.
+    host_began_us: u64,
     random: Random,
     /// Points that change with each update.
     pub(super) churn: u64,
@@ -62,6 +64,7 @@ impl Drill {
             store,
             peers: Vec::new(),
             now_us: 0,
+            host_began_us: 0,
             random: Random(seed),
             churn: 20,
             hosts: 1,
@@ -93,11 +96,12 @@ impl Drill {
 
     /// The connection of a viewer breaks; the host hears of it.
     pub(super) fn cut(&mut self, peer: usize) {
+        let host_us = self.host_us();
         let peer = &mut self.peers[peer];
         peer.up.cut();
         peer.down.cut();
         if let Some(link) = peer.link.take() {
-            self.host.leave(link, self.now_us);
+            self.host.leave(link, host_us);
         }
         peer.is_connected = false;
         peer.retry_us = self.now_us + peer.guest.disconnected();
@@ -110,7 +114,8 @@ impl Drill {
         }
         self.hosts += 1;
         // Its clock begins anew; the drill's goes on.
-        self.host = Host::new(self.scene.clone(), self.host_config.clone(), self.now_us);
+        self.host_began_us = self.now_us;
+        self.host = Host::new(self.scene.clone(), self.host_config.clone(), 0);
         self.publisher = publisher(&self.scene, self.hosts * 1000);
         self.publisher.publish(&self.store);
     }
@@ -128,8 +133,14 @@ impl Drill {
         }
     }
 
+    /// The host's clock.
+    pub(super) fn host_us(&self) -> u64 {
+        self.now_us - self.host_began_us
+    }
+
     fn tick(&mut self) {
-        let tick = self.host.begin_step(self.now_us);
+        let host_us = self.host_us();
+        let tick = self.host.begin_step(host_us);
         let points = self.store.layout().len() as u64;
         let changes: Vec<Change> = (0..self.churn)
             .map(|_| Change {
@@ -139,16 +150,16 @@ impl Drill {
             .collect();
         self.store.apply(&changes).unwrap();
         let frame = self.publisher.publish(&self.store);
-        self.host.publish(0, &tick, frame.as_ref(), self.now_us);
+        self.host.publish(0, &tick, frame.as_ref(), host_us);
         if self.host.wants_snapshot(0) {
             let snapshot = self.publisher.join().unwrap();
-            self.host.put_snapshot(0, &tick, &snapshot, self.now_us);
+            self.host.put_snapshot(0, &tick, &snapshot, host_us);
         }
-        self.host.end_step(&tick, self.now_us, Status::default());
+        self.host.end_step(&tick, host_us, Status::default());
     }
 
     fn serve(&mut self, index: usize) {
-        let now_us = self.now_us;
+        let (now_us, host_us) = (self.now_us, self.host_us());
         let peer = &mut self.peers[index];
         if !peer.is_connected && now_us >= peer.retry_us {
             peer.is_connected = true;
@@ -169,19 +180,22 @@ impl Drill {
                 FromViewer::Hello(hello) => hello,
                 _ => {
                     if let Some(link) = peer.link {
-                        self.host.receive(link, &text, now_us).unwrap();
+                        self.host.receive(link, &text, host_us).unwrap();
                     }
                     continue;
                 }
             };
-            // On links that duplicate, a hello may come again: the connection is then there already.
-            if peer.link.is_some() && !peer.is_ordered {
-                let link = peer.link.unwrap();
-                self.host.leave(link, now_us);
+            // Said again: over an ordered link the host hears it like anything else, over others the welcome may have been lost.
+            if let Some(link) = peer.link {
+                if peer.is_ordered {
+                    self.host.receive(link, &text, host_us).unwrap();
+                    continue;
+                }
+                self.host.leave(link, host_us);
             }
             let key = format!("{:032x}", self.random.bits());
-            let arrival = Arrival { key, is_reliable: peer.is_ordered, unix_us: 0 };
-            match self.host.join(&hello, arrival, now_us) {
+            let arrival = Arrival { key, is_reliable: peer.is_ordered, is_foreign: false, unix_us: 0 };
+            match self.host.join(&hello, arrival, host_us) {
                 Ok(link) => peer.link = Some(link),
                 Err(refusal) => peer.refused.push(refusal),
             }
@@ -190,7 +204,7 @@ impl Drill {
             && peer.down.has_room(now_us)
             && now_us >= peer.stalled_until_us
         {
-            match self.host.next(link, now_us) {
+            match self.host.next(link, host_us) {
                 Next::Send(message) => {
                     let bytes = match &message {
                         Outgoing::Text(text) => text.len(),
@@ -218,6 +232,7 @@ impl Drill {
             };
             match news {
                 Ok(News::Light(frame)) if !frame.is_empty() => peer.apply(&frame),
+                Ok(News::Welcome(false)) => peer.subscriber.outdate(),
                 Ok(_) => {}
                 // A change that was built on another state than the one held cannot be told from a right one by a viewer alone.
                 Err(GuestError::Refused(refusal)) => peer.refused.push(refusal),

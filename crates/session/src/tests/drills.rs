@@ -157,12 +157,40 @@ fn another_host_in_the_place_of_one_that_died_is_taken_on() {
 }
 
 #[test]
+fn a_way_of_more_than_a_second_is_no_reason_to_part() {
+    let mut drill = Drill::new(4000, HostConfig::default(), 8);
+    let peer = drill.add_peer(Faults { delay_us: 700_000, ..tcp() });
+    drill.run(4.0);
+    assert!(drill.peers[peer].guest.send(moved(1.0)));
+    drill.run(6.0);
+    settle(&mut drill);
+    drill.check(peer).unwrap();
+    assert!(drill.peers[peer].refused.is_empty(), "{:?}", drill.peers[peer].refused);
+    assert_eq!((drill.host.counts().joined, drill.host.counts().events), (1, 1));
+}
+
+#[test]
+fn after_another_host_ages_and_times_are_right_again() {
+    let mut drill = Drill::new(4000, HostConfig::default(), 9);
+    let peer = drill.add_peer(tcp());
+    drill.run(20.0);
+    drill.replace_host();
+    drill.run(3.0);
+    let guest = &drill.peers[peer].guest;
+    let host_s = drill.host.state().1.time_us(drill.host_us()) as f64 * 1e-6;
+    let behind_s = host_s - guest.scene_time_s(drill.now_us);
+    assert!((0.0..0.2).contains(&behind_s), "{behind_s} s behind");
+    assert!(guest.age_s(drill.now_us).unwrap() < 0.3);
+    assert!(!drill.host.take_ages().is_empty(), "the new host hears how old its light is");
+}
+
+#[test]
 fn time_is_the_same_for_everyone() {
     let mut drill = Drill::new(100, HostConfig::default(), 7);
     let peers = [drill.add_peer(tcp()), drill.add_peer(Faults { delay_us: 80_000, ..tcp() })];
     drill.run(4.0);
     let times = peers.map(|peer| drill.peers[peer].guest.scene_time_s(drill.now_us));
-    let host_s = drill.host.state().1.time_us(drill.now_us) as f64 * 1e-6;
+    let host_s = drill.host.state().1.time_us(drill.host_us()) as f64 * 1e-6;
     for (time, delay) in times.into_iter().zip([0.02, 0.08]) {
         let behind = host_s - time;
         assert!((delay - 0.01..delay + 0.06).contains(&behind), "{behind} s behind");

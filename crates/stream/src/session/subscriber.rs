@@ -137,6 +137,13 @@ impl Subscriber {
         }
     }
 
+    /// What is held belongs to another stream from now on: it stays, and the next snapshot replaces it, whatever its group is (above 0).
+    pub fn outdate(&mut self) {
+        if let Some(state) = &mut self.state {
+            (state.group, state.epoch) = (0, 0);
+        }
+    }
+
     /// Lets go of what is held: the next frame must be a snapshot.
     pub fn forget(&mut self) {
         self.state = None;
