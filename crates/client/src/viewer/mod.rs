@@ -260,6 +260,11 @@ impl Viewer {
         self.light.subscriber.store()
     }
 
+    /// Group and epoch of what this viewer holds.
+    pub fn held(&self) -> Option<(u64, u64)> {
+        self.light.subscriber.group().zip(self.light.subscriber.epoch())
+    }
+
     /// The scene that it shows.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.scene
