@@ -10,6 +10,7 @@ pub mod controls;
 pub mod pace;
 #[cfg(feature = "paper")]
 pub mod paper;
+mod pick;
 pub mod rate;
 #[cfg(feature = "gpu")]
 pub mod viewer;
@@ -27,6 +28,8 @@ use dapple_scene::{Edits, Pose, PosedCamera, Scene};
 use dapple_store::charts::Cuts;
 use dapple_store::points::PointStore;
 use dapple_stream::{Applied, Limits, ReceiveError, Subscriber};
+
+pub use pick::{Picked, pick};
 
 /// One viewer's copy of the light, and the passes that draw with it.
 pub struct Client {

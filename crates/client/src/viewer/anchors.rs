@@ -31,7 +31,7 @@ impl Anchors {
         Anchors { sets: sets.collect() }
     }
 
-    /// World positions of all points, in the store's order.
+    /// World positions of all points, in the store's order; not numbers for those of instances that are not there.
     pub(super) fn positions_world(&self, layout: &PointLayout, scene: &Scene, pose: &Pose) -> Vec<Vec3> {
         let mut positions = Vec::with_capacity(layout.len());
         for (set, anchors) in layout.sets().iter().zip(&self.sets) {
@@ -41,6 +41,10 @@ impl Anchors {
                 positions.extend((0..set.len()).map(|_| Vec3::NAN));
                 continue;
             };
+            if !posed.is_there() {
+                positions.extend((0..set.len()).map(|_| Vec3::NAN));
+                continue;
+            }
             let mesh = &scene.meshes[instance.mesh as usize];
             match &posed.deformed {
                 Some(deformed) if !anchors.is_empty() => positions.extend(anchors.iter().map(|anchor| {

@@ -24,6 +24,7 @@ use dapple_scene::{Edits, Pose, PosedCamera, Scene};
 use dapple_store::points::PointStore;
 use dapple_stream::{Applied, ReceiveError, Subscriber};
 
+use crate::{Picked, pick};
 use anchors::Anchors;
 use light::Light;
 pub use options::{DebugView, DrawOptions, LoadProgress, Method, ViewerConfig, ViewerError, ViewerStats};
@@ -106,6 +107,17 @@ impl Viewer {
     /// What is shown changed; as at first ([`Edits::new`]) until [`Viewer::set_edits`].
     pub fn edits(&self) -> &Edits {
         &self.edits
+    }
+
+    /// What is under a place of the picture that [`Viewer::draw`] draws with the same camera, size and time: [`pick()`].
+    pub fn pick(
+        &self,
+        camera: &PosedCamera,
+        size: (u32, u32),
+        at: (f32, f32),
+        scene_time_s: f64,
+    ) -> Option<Picked> {
+        pick(&self.scene, &self.edits, camera, size, at, scene_time_s)
     }
 
     /// Takes one frame off the wire, which came at `now_s` (seconds on the caller's clock, as in [`Viewer::draw`]).
@@ -226,7 +238,9 @@ impl Viewer {
         if shown.placed != now {
             let positions = shown.anchors.positions_world(layout, &self.scene, pose);
             let values = store.visibility().iter().map(|&v| f32::from(v) / 255.0);
-            shown.on_card.upload(gpu, positions.into_iter().zip(values));
+            // What is not there has no place.
+            let placed = positions.into_iter().zip(values).filter(|(position, _)| position.is_finite());
+            shown.on_card.upload(gpu, placed);
             shown.placed = now;
         }
     }

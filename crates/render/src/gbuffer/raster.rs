@@ -196,7 +196,7 @@ pub(crate) fn draw<S: Sink>(
 fn split(scene: &Scene, pose: &Pose, cull: bool, include: impl Fn(usize) -> bool) -> Vec<Chunk> {
     let mut chunks = Vec::new();
     for (i, (instance, posed)) in scene.instances.iter().zip(&pose.instances).enumerate() {
-        if !include(i) {
+        if !include(i) || !posed.is_there() {
             continue;
         }
         let mesh = &scene.meshes[instance.mesh as usize];

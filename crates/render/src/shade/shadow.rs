@@ -98,7 +98,7 @@ pub(crate) fn faces_of(
 fn caster_positions(scene: &Scene, pose: &Pose) -> Vec<Vec3> {
     let mut positions = Vec::new();
     for (instance, posed) in scene.instances.iter().zip(&pose.instances) {
-        if !instance.casts {
+        if !(instance.casts && posed.is_there()) {
             continue;
         }
         let mesh = &scene.meshes[instance.mesh as usize];

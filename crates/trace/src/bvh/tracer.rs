@@ -16,7 +16,7 @@ use super::tree::Tree;
 
 /// Answers ray queries on a scene in one pose.
 ///
-/// Instances that do not cast ([`dapple_scene::Instance::casts`]), and those whose transform cannot be inverted in
+/// Instances that do not cast ([`dapple_scene::Instance::casts`]) or are not there ([`PosedInstance::is_there`]), and those whose transform cannot be inverted in
 /// `f32` (scale 0, or a million times smaller than another), are not hit. Where a material has alpha (`Mask`, or `Blend` with cutoff 0.5), texels below the
 /// cutoff let rays through.
 #[derive(Clone)]
@@ -132,7 +132,11 @@ impl Tracer {
             let instance = &scene.instances[i];
             let posed = pose.instances.get(i)?;
             let mesh = scene.meshes.get(instance.mesh as usize)?;
-            (instance.casts && !mesh.triangles.is_empty()).then_some((instance.mesh as usize, mesh, posed))
+            (instance.casts && posed.is_there() && !mesh.triangles.is_empty()).then_some((
+                instance.mesh as usize,
+                mesh,
+                posed,
+            ))
         };
         let mut wanted = vec![false; scene.meshes.len()];
         for (mesh, _, posed) in (0..scene.instances.len()).filter_map(posed_caster) {

@@ -79,6 +79,9 @@ impl CasterBounds {
 
     /// A box around an instance without looking at its vertices, in the space that `map` leads to from the world.
     fn loose(&self, scene: &Scene, pose: &Pose, i: usize, map: &Affine3A) -> Aabb {
+        if !pose.instances[i].is_there() {
+            return Aabb::EMPTY;
+        }
         let instance = &scene.instances[i];
         let bounds = &self.meshes[instance.mesh as usize];
         let weights = pose.morph_weights.get(i).map_or(&[][..], Vec::as_slice);
@@ -130,6 +133,9 @@ impl CasterBounds {
         let mut sum = Aabb::EMPTY;
         for (i, instance) in scene.instances.iter().enumerate().filter(|(_, instance)| instance.casts) {
             let posed = &pose.instances[i];
+            if !posed.is_there() {
+                continue;
+            }
             let mesh = &scene.meshes[instance.mesh as usize];
             let deforms =
                 !mesh.morph_targets.is_empty() || (instance.skin.is_some() && !mesh.influences.is_empty());

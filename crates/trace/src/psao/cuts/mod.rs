@@ -24,8 +24,8 @@ const LIFT: f32 = 0.15;
 
 /// Finds the cuts of all instances. `pose` is the scene's at time 0, `tracer` is up to date with it.
 ///
-/// What never moves is tested against everything that never moves. What moves is tested against its own mesh at rest, the
-/// only thing that stays in place about it. Instances whose mesh cannot be cut into charts have none.
+/// What never moves is tested against everything that never moves. What moves, or is not there yet, is tested against its own
+/// mesh at rest, the only thing that stays in place about it. Instances whose mesh cannot be cut into charts have none.
 ///
 /// `progress` is called with the number of instances that are done.
 pub fn find_cuts(
@@ -69,7 +69,7 @@ pub fn find_cuts(
         if scene.is_two_sided(mesh) {
             add_back_sites(&mut sites, charts.texel_count());
         }
-        let rests = moves[index] || posed.deformed.is_some();
+        let rests = moves[index] || posed.deformed.is_some() || !posed.is_there();
         let own = rests.then(|| tracer.resting(scene, index));
         let test = Test {
             tracer: own.as_ref().unwrap_or(&still),

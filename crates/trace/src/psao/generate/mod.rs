@@ -393,10 +393,11 @@ impl LaidInstance {
         params: &GenerateParams,
     ) -> Option<Vec<bool>> {
         let rays = params.inside_rays.min(256);
-        if rays == 0 {
+        let instance = self.instance;
+        // What is not there yet lies inside of nothing.
+        if rays == 0 || !pose.instances[instance].is_there() {
             return None;
         }
-        let instance = self.instance;
         // Of which instances a back face means "inside" for these points.
         let counts = |other: usize| match sides.moving[instance] {
             true => other == instance && sides.single[other],

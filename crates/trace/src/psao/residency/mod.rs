@@ -83,6 +83,8 @@ enum Class {
     Soon,
     /// It is out of sight, but has points.
     Here,
+    /// It has points, and was taken away: nowhere can it be seen.
+    Gone,
 }
 
 /// What is there counts as so many times as large as it looks: two that look alike do not take turns, and what one looks at does not
@@ -186,7 +188,13 @@ impl Residency {
     fn rank(&mut self, watch: &Watch<'_>) -> Vec<Rank> {
         let mut ranked = Vec::new();
         for (index, (instance, bounds)) in self.instances.iter_mut().zip(watch.bounds_world).enumerate() {
-            if instance.most_points == 0 || bounds.is_empty() {
+            if instance.most_points == 0 {
+                continue;
+            }
+            if bounds.is_empty() {
+                if instance.here.is_some() {
+                    ranked.push(Rank { class: Class::Gone, seen: instance.seen, size: 0.0, index });
+                }
                 continue;
             }
             let touches = |bounds: &Aabb| watch.interest.iter().any(|volume| volume.touches(bounds));

@@ -98,6 +98,26 @@ fn the_near_come_before_the_far_and_what_is_almost_seen_before_what_is_not() {
     assert_eq!(all.fill(&watch).spawn, [1, 2, 3, 4, 5], "what lies behind is not almost seen");
 }
 
+#[test]
+fn what_was_taken_away_gives_way_and_comes_back() {
+    let mut bounds = row(4);
+    let mut residency = Residency::new(params(200), vec![100; 4]);
+    assert_eq!(residency.fill(&Watch { bounds_world: &bounds, interest: &[] }).spawn, [0, 1]);
+    let taken = std::mem::replace(&mut bounds[0], Aabb::EMPTY);
+    for interest in [&[][..], &[slab(0, 4)]] {
+        let mut residency = residency.clone();
+        let turnover = residency.step(&Watch { bounds_world: &bounds, interest });
+        assert_eq!(turnover, Turnover { evict: vec![0], spawn: vec![2] });
+        assert_eq!(residency.points(), 200);
+    }
+    // While there is room it keeps its points.
+    let mut roomy = Residency::new(params(400), vec![100; 4]);
+    bounds[0] = taken;
+    roomy.fill(&Watch { bounds_world: &bounds, interest: &[] });
+    bounds[0] = Aabb::EMPTY;
+    assert_eq!(roomy.step(&Watch { bounds_world: &bounds, interest: &[] }), Turnover::default());
+}
+
 proptest! {
     #[test]
     fn the_cap_holds_whatever_is_looked_at(

@@ -4,6 +4,7 @@ mod budget;
 mod exact;
 mod memory;
 mod refine;
+mod removal;
 mod spawn;
 mod timing;
 
