@@ -303,12 +303,14 @@ class Viewer {
 
   get stats() {
     const stats = this.#living().stats(performance.now() / 1000);
-    if (stats.live) Object.assign(stats.live, this.#link?.status, { applyMs: this.#link?.applyMs ?? 0 });
+    stats.live = this.live;
     return stats;
   }
 
   get live() {
-    return this.#link ? this.stats.live : null;
+    if (!this.#link) return null;
+    const live = this.#living().liveStatus(performance.now() / 1000);
+    return Object.assign(live, this.#link.status, { applyMs: this.#link.applyMs });
   }
 
   get edits() {

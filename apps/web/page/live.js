@@ -88,7 +88,9 @@ export class LiveLink {
     try {
       socket = new WebSocket(this.#url);
     } catch (error) {
-      this.#refuse({ reason: "address", message: `${this.#url} is no address of a live session: ${error.message}` });
+      const message = `${this.#url} is no address of a live session: ${error.message}`;
+      // Whoever makes this knows it only once it is made.
+      queueMicrotask(() => this.#refuse({ reason: "address", message }));
       return;
     }
     this.#socket = socket;

@@ -233,7 +233,9 @@ async function start() {
   viewer = created;
   // For tests, and for the curious at the console.
   globalThis.dapple = created;
-  document.title = `${new URL(options.scene, document.baseURI).pathname.split("/").pop()} · Dapple`;
+  // The scene of a session is named after its content, which says nothing to people.
+  const name = options.live ? "Live" : new URL(options.scene, document.baseURI).pathname.split("/").pop();
+  document.title = `${name} · Dapple`;
   if (options.method) method.value = options.method;
   if (options.view) what.value = options.view;
   if (options.split) {

@@ -111,7 +111,8 @@ impl Core {
         if let Some(animation) = animation {
             let count = scene.animations.len();
             if animation as usize >= count {
-                let message = format!("there is no animation {animation}: {name} has {count}, counted from 0");
+                let message =
+                    format!("there is no animation {animation}: {name} has {count}, counted from 0");
                 return Err(JsError::new(&message));
             }
             scene.set_active_animation(Some(animation));
@@ -313,7 +314,6 @@ impl Core {
             ("duration", duration_s.into()),
             ("playing", is_playing.into()),
             ("problem", problem.map_or(JsValue::NULL, JsValue::from_str)),
-            ("live", self.live_stats(now_s)),
         ])
     }
 

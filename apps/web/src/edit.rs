@@ -69,7 +69,8 @@ impl Core {
 
     /// Where a node stands to its parent: `{ translation, rotation, scale }`; null for one that is not there.
     pub fn placement(&self, node: u32) -> JsValue {
-        let placement = self.posed().and_then(|(scene, viewer, pose)| placement_of(scene, viewer.edits(), &pose, node));
+        let placement =
+            self.posed().and_then(|(scene, viewer, pose)| placement_of(scene, viewer.edits(), &pose, node));
         placement.map_or(JsValue::NULL, |placement| placement_object(&placement))
     }
 

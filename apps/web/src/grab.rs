@@ -84,7 +84,13 @@ pub fn placement_of(scene: &Scene, edits: &Edits, pose: &Pose, node: u32) -> Opt
 }
 
 /// A placement that lies so far away in the world, metres.
-pub fn moved(scene: &Scene, pose: &Pose, node: u32, placement: &Placement, way_world: Vec3) -> Option<Placement> {
+pub fn moved(
+    scene: &Scene,
+    pose: &Pose,
+    node: u32,
+    placement: &Placement,
+    way_world: Vec3,
+) -> Option<Placement> {
     let parent_from_world = Mat3::from(world_from_parent(scene, pose, node)?.matrix3).inverse();
     let translation = Vec3::from(placement.translation) + parent_from_world * way_world;
     translation.is_finite().then_some(Placement { translation: translation.to_array(), ..*placement })
@@ -157,8 +163,8 @@ mod tests {
                 let edit = dapple_scene::Edit::Place { node, placement: grab.placement };
                 moved.apply(&scene, &edit).unwrap();
                 let now = scene.pose_edited(0.0, &moved);
-                let [before, after] =
-                    [&pose, &now].map(|pose| pose.world_from_node[node as usize].transform_point3(Vec3::ZERO));
+                let [before, after] = [&pose, &now]
+                    .map(|pose| pose.world_from_node[node as usize].transform_point3(Vec3::ZERO));
                 assert!((after - before).distance(target - at) < 1e-3, "{node} {way:?}: {before} {after}");
             }
         }

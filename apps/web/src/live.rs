@@ -23,7 +23,12 @@ impl Core {
     /// Makes the viewer one of a live session: the host says what time it is and what was changed. Once, after the scene was
     /// loaded. `bits_per_second` 0 is as many as there are; `seed` spreads the times at which many viewers try again.
     #[wasm_bindgen(js_name = openLive)]
-    pub fn open_live(&mut self, token: Option<String>, bits_per_second: f64, seed: u32) -> Result<(), JsError> {
+    pub fn open_live(
+        &mut self,
+        token: Option<String>,
+        bits_per_second: f64,
+        seed: u32,
+    ) -> Result<(), JsError> {
         let scene = self.scene().ok_or_else(|| JsError::new("a live session needs a scene"))?;
         let config = GuestConfig {
             token,
@@ -148,44 +153,9 @@ impl Core {
         self.send(event)
     }
 
-    /// What was changed of the scene, as JSON.
-    pub fn edits(&self) -> Option<String> {
-        serde_json::to_string(self.shown.as_ref()?.viewer.edits()).ok()
-    }
-}
-
-impl Core {
-    /// Asks the host for something.
-    pub(crate) fn send(&mut self, event: Event) -> Result<(), JsError> {
-        let Some(live) = &mut self.live else {
-            return Err(JsError::new("this viewer shows no live session: there is nobody to ask for a change"));
-        };
-        match live.guest.role() {
-            Some(Role::Interact) => {}
-            Some(Role::View) => return Err(JsError::new("this viewer may look, not change: that needs another token")),
-            None => return Err(JsError::new("there is no connection to the server now: nothing can be changed")),
-        }
-        // A host lets nobody stay who says what is out of range.
-        FromViewer::parse(&FromViewer::Event { number: 1, event: event.clone() }.to_text())?;
-        if !live.guest.send(event) {
-            return Err(JsError::new("the server has not answered what was asked before: wait a little"));
-        }
-        Ok(())
-    }
-
-    /// Goes to the scene's time by the host's clock, while it is known.
-    pub(crate) fn follow_host(&mut self, now_s: f64) {
-        let Some(live) = self.live.as_ref().filter(|live| live.hears_light) else { return };
-        let time_s = live.guest.scene_time_s(micros(now_s));
-        if time_s != self.clock.time_s() {
-            self.clock.seek(time_s);
-            let scene = self.shown.as_ref().map(|shown| Arc::clone(&shown.scene));
-            self.changed |= scene.is_some_and(|scene| self.steering.follows_time(&scene));
-        }
-    }
-
-    /// Figures of the session; null without one.
-    pub(crate) fn live_stats(&self, now_s: f64) -> JsValue {
+    /// Figures of the session; the names are those of `dapple.d.ts`. null without one.
+    #[wasm_bindgen(js_name = liveStatus)]
+    pub fn live_status(&self, now_s: f64) -> JsValue {
         let Some(live) = &self.live else { return JsValue::NULL };
         let guest = &live.guest;
         let (status, latency) = (guest.status(), guest.latency());
@@ -208,6 +178,48 @@ impl Core {
             ("pending", guest.has_pending().into()),
             ("hasLight", live.has_light.into()),
         ])
+    }
+
+    /// What was changed of the scene, as JSON.
+    pub fn edits(&self) -> Option<String> {
+        serde_json::to_string(self.shown.as_ref()?.viewer.edits()).ok()
+    }
+}
+
+impl Core {
+    /// Asks the host for something.
+    pub(crate) fn send(&mut self, event: Event) -> Result<(), JsError> {
+        let Some(live) = &mut self.live else {
+            return Err(JsError::new(
+                "this viewer shows no live session: there is nobody to ask for a change",
+            ));
+        };
+        match live.guest.role() {
+            Some(Role::Interact) => {}
+            Some(Role::View) => {
+                return Err(JsError::new("this viewer may look, not change: that needs another token"));
+            }
+            None => {
+                return Err(JsError::new("there is no connection to the server now: nothing can be changed"));
+            }
+        }
+        // A host lets nobody stay who says what is out of range.
+        FromViewer::parse(&FromViewer::Event { number: 1, event: event.clone() }.to_text())?;
+        if !live.guest.send(event) {
+            return Err(JsError::new("the server has not answered what was asked before: wait a little"));
+        }
+        Ok(())
+    }
+
+    /// Goes to the scene's time by the host's clock, while it is known.
+    pub(crate) fn follow_host(&mut self, now_s: f64) {
+        let Some(live) = self.live.as_ref().filter(|live| live.hears_light) else { return };
+        let time_s = live.guest.scene_time_s(micros(now_s));
+        if time_s != self.clock.time_s() {
+            self.clock.seek(time_s);
+            let scene = self.shown.as_ref().map(|shown| Arc::clone(&shown.scene));
+            self.changed |= scene.is_some_and(|scene| self.steering.follows_time(&scene));
+        }
     }
 }
 
