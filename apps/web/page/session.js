@@ -94,6 +94,7 @@ export class SessionPanel {
     for (const [name, value] of Object.entries(stages)) byId(name).textContent = milliseconds(value);
     byId("behind").textContent = live.behind.toLocaleString("en");
     for (const row of document.querySelectorAll("#figures .live")) row.hidden = false;
+    byId("age-row").hidden = true;
     this.#show(live);
   }
 

@@ -117,7 +117,7 @@ impl Core {
             }
             scene.set_active_animation(Some(animation));
         }
-        let (spares, _) = spares.as_chunks();
+        let (spares, _) = spares.as_chunks::<2>();
         let spares: Vec<Spare> = spares.iter().map(|&[instance, count]| Spare { instance, count }).collect();
         scene.add_spares(&spares)?;
         let scene = Arc::new(scene);
@@ -293,7 +293,7 @@ impl Core {
             if info.backend == dapple_gpu::wgpu::Backend::BrowserWebGpu { "webgpu" } else { "webgl2" };
         let age_s = stats.last_frame_s.map_or(JsValue::NULL, |last| (now_s - last).max(0.0).into());
         let (heap_bytes, card_bytes) = stats.memory_bytes;
-        let (time_s, duration_s, is_playing) = self.shown_time();
+        let (time_s, duration_s, is_playing) = self.shown_time(now_s);
         object(&[
             ("fps", self.pictures.per_second(now_s).into()),
             ("megabitsPerSecond", (self.bytes.per_second(now_s) * 8e-6).into()),
@@ -324,11 +324,12 @@ impl Core {
     }
 
     /// Time of the scene and where it begins again (0 for never), seconds, and whether it runs.
-    fn shown_time(&self) -> (f64, f64, bool) {
+    fn shown_time(&self, now_s: f64) -> (f64, f64, bool) {
         match (&self.live, &self.shown) {
             (Some(live), Some(shown)) => {
                 // The host's time knows no end: it is shown as that of the animation.
-                let (time_s, duration_s) = (self.clock.time_s(), self.steering.duration_s(&shown.scene));
+                let time_s = self.host_time_s(now_s).unwrap_or(self.clock.time_s());
+                let duration_s = self.steering.duration_s(&shown.scene);
                 let time_s = if duration_s > 0.0 { time_s.rem_euclid(duration_s) } else { time_s };
                 (time_s, duration_s, live.guest.clock().playing)
             }

@@ -211,10 +211,15 @@ impl Core {
         Ok(())
     }
 
+    /// The scene's time by the host's clock, seconds, while that is known.
+    pub(crate) fn host_time_s(&self, now_s: f64) -> Option<f64> {
+        let live = self.live.as_ref().filter(|live| live.hears_light)?;
+        Some(live.guest.scene_time_s(micros(now_s)))
+    }
+
     /// Goes to the scene's time by the host's clock, while it is known.
     pub(crate) fn follow_host(&mut self, now_s: f64) {
-        let Some(live) = self.live.as_ref().filter(|live| live.hears_light) else { return };
-        let time_s = live.guest.scene_time_s(micros(now_s));
+        let Some(time_s) = self.host_time_s(now_s) else { return };
         if time_s != self.clock.time_s() {
             self.clock.seek(time_s);
             let scene = self.shown.as_ref().map(|shown| Arc::clone(&shown.scene));

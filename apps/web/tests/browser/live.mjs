@@ -50,8 +50,7 @@ async function run() {
   // Something that lies in the hall, seen from near by.
   const boulder = await mover.evaluate(findBoulder);
   facts.boulder = boulder;
-  const [x, y, z] = boulder.position;
-  const camera = { eye: [x - 2.2, y + 1.6, z + 2.2], target: [x, y, z], yfovDegrees: 50 };
+  const camera = { eye: boulder.eye, target: boulder.position, yfovDegrees: 50 };
   for (const tab of both) await tab.evaluate((camera) => dapple.setCamera(camera), camera);
   await picture(looker, "before");
 
@@ -209,7 +208,9 @@ async function open(name, url, { width, height, phone }) {
   return tab;
 }
 
-const until = (tab, what, argument) => tab.waitForFunction(what, argument, { timeout: PATIENCE_MS, polling: 100 });
+function until(tab, what, argument) {
+  return tab.waitForFunction(what, argument, { timeout: PATIENCE_MS, polling: 100 });
+}
 
 async function isLive(tab) {
   await until(tab, () => globalThis.dapple?.live?.state === "live" && dapple.live.hasLight);
@@ -217,7 +218,9 @@ async function isLive(tab) {
 }
 
 // Figures are renewed twice a second.
-const settle = (tab) => tab.waitForTimeout(1300);
+function settle(tab) {
+  return tab.waitForTimeout(1300);
+}
 
 async function shot(tab, name) {
   await settle(tab);
@@ -250,7 +253,11 @@ function findBoulder() {
     for (let y = 20; y < innerHeight; y += 40) {
       for (let x = 20; x < innerWidth; x += 40) {
         const picked = dapple.pick(x, y);
-        if (picked && /boulder/.test(picked.name)) return picked;
+        if (!picked || !/boulder/.test(picked.name)) continue;
+        // Nearer along the way on which nothing stands between.
+        const { eye } = dapple.getCamera();
+        const part = 3 / Math.max(3, Math.hypot(...eye.map((x, i) => x - picked.position[i])));
+        return { ...picked, eye: picked.position.map((x, i) => x + part * (eye[i] - x)) };
       }
     }
   }
