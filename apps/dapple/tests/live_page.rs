@@ -66,10 +66,14 @@ fn what_one_page_moves_the_others_see() {
     let _ = std::fs::remove_dir_all(&folder);
     std::fs::create_dir_all(&folder).unwrap();
     let page = page.to_str().unwrap();
+    let spares: Vec<String> = (0..12).map(|i| format!("boulder-{i}=1")).collect();
     let serve = |detail: &'static str| {
         let scene = ["serve", "--builtin", "atrium", "--detail", detail, "--points", "128", "--hz", "10"];
-        let access = ["--token", "interact=touch", "--max-viewers", "2", "--spare", "boulder-0=1"];
-        [&scene[..], &access, &["--page", page]].concat()
+        let access = ["--token", "interact=touch", "--max-viewers", "2", "--page", page];
+        let mut arguments = [&scene[..], &access].concat();
+        // Whichever is in view, there is another like it.
+        arguments.extend(spares.iter().flat_map(|spare| ["--spare", spare]));
+        arguments
     };
     let plan = json!({
         "browser": browser, "program": env!("CARGO_BIN_EXE_dapple"), "serve": serve("0.2"), "other": serve("0.1"),

@@ -143,6 +143,12 @@ async function run() {
   const phone = await open("phone", `${url}?token=${plan.token}&${COARSE}`, { width: 390, height: 844, phone: true });
   await isLive(phone);
   await phone.evaluate((camera) => dapple.setCamera(camera), camera);
+  // To the time at which the boulder lay there.
+  await phone.evaluate((time) => {
+    dapple.pause();
+    dapple.seek(time);
+  }, facts.times[0]);
+  await until(phone, (time) => dapple.paused && Math.abs(dapple.time - time) < 1e-3, facts.times[0]);
   await phone.tap("#across");
   await settle(phone);
   const there = await phone.evaluate(whereIs, boulder.instance);
