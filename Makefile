@@ -5,7 +5,7 @@ export PATH := $(PATH):$(HOME)/.cargo/bin
 
 REPORT := $(CURDIR)/out/demo
 
-.PHONY: demo web test bench check fmt
+.PHONY: demo web test bench soak check fmt
 
 # The whole loop on the built-in scene and a report of it; then the page, served on this machine (not with CI set).
 demo:
@@ -32,6 +32,12 @@ bench:
 	cargo bench --package dapple-trace --bench rays
 	cargo bench --package dapple-server --bench step
 	cargo bench --package dapple --bench lookup
+
+# A live server under viewers that come, go, break off, stall and move things; SECONDS=60 for a minute.
+SECONDS ?= 600
+soak:
+	@bash scripts/setup.sh
+	cargo run --release --package dapple -- bench soak --seconds $(SECONDS)
 
 check:
 	cargo xtask check

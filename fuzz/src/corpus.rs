@@ -19,6 +19,31 @@ const TARGETS_JSON: &str = r#"{"version":1,"name":"a","loop":true,"keys":[
 const ROTATIONS_JSON: &str = r#"{"version":1,"name":"b","interpolation":"linear","keys":[
 {"time_s":0.5,"eye":[-3,1.25,2e1],"rotation":[0,0,0,1]},{"time_s":2,"eye":[0,1,1],"rotation":[0,0.6,0,0.8]}]}"#;
 
+/// What viewers say, one of each, and what is wrong with some.
+const VIEWER_LINES: &str = r#"{"type":"event","number":1,"event":{"event":"pause"}}
+{"type":"event","number":2,"event":{"event":"seek","time_s":1.5}}
+{"type":"event","number":3,"event":{"event":"edit","change":{"edit":"place","node":1,"placement":{"translation":[1,2,3],"rotation":[0,0,0,1],"scale":[1,1,1]}}}}
+{"type":"event","number":4,"event":{"event":"edit","change":{"edit":"remove","instance":0}}}
+{"type":"event","number":5,"event":{"event":"add","like":0,"placement":{"translation":[0,0,0],"rotation":[0,1,0,0],"scale":[2,1,0.5]}}}
+{"type":"event","number":6,"event":{"event":"edit","change":{"edit":"light","light":0,"color":[1,0.5,0],"intensity":10}}}
+{"type":"event","number":7,"event":{"event":"edit","change":{"edit":"reset-light","light":0}}}
+{"type":"event","number":8,"event":{"event":"edit","change":{"edit":"release","node":1}}}
+{"type":"event","number":9,"event":{"event":"play"}}
+{"type":"event","number":10,"event":{"event":"edit","change":{"edit":"reset"}}}
+{"type":"look","number":1,"camera":{"eye":[0,1,2],"forward":[0,0,-1],"up":[0,1,0],"yfov":0.9,"aspect":1.5},"held":{"group":1,"epoch":2},"state":3,"heard_us":4,"waited_us":5,"came":6,"lost":0}
+{"type":"event","number":11,"event":{"event":"edit","change":{"edit":"remove","instance":99}}}
+{"type":"bye"}
+{"type":"hello","protocol":1,"wire":4,"scene":"00","token":"t","key":"k","bits_per_s":500000}"#;
+
+/// What hosts say, one of each.
+const HOST_LINES: &str = r#"{"type":"welcome","protocol":1,"viewer":1,"key":"k","role":"interact","hz":30.0,"heard":0,"bits_per_s":null,"events_per_s":60,"clock_us":1,"unix_us":2}
+{"type":"state","version":1,"clock":{"playing":true,"time_us":0,"at_us":0},"edits":{"placed":[],"removed":[],"lights":[]}}
+{"type":"changes","from":1,"to":2,"clock":{"playing":false,"time_us":5,"at_us":6},"edits":[{"edit":"remove","instance":0}]}
+{"type":"heard","number":3}
+{"type":"rejected","number":4,"message":"no"}
+{"type":"status","viewers":2,"step_us":3,"queue_us":4,"round_trip_us":5,"ray_budget":6,"waiting":7}
+{"type":"refused","reason":"closing","message":"later"}"#;
+
 /// The store that seeds and targets have in common: regular enough that its sections compress.
 pub(crate) fn sample() -> PointStore {
     let mut bytes = vec![2, 0];
@@ -126,6 +151,12 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
         seeds.push(("read_recording", name.to_owned(), recording(name, frames)));
     }
 
+    for (name, lines) in [("viewer", VIEWER_LINES), ("host", HOST_LINES)] {
+        seeds.push(("live_session", name.to_owned(), lines.as_bytes().to_vec()));
+    }
+    let mut light = dapple_session::LightHead { made_us: 7, ..Default::default() }.messages(&[1, 2, 3]);
+    seeds.push(("live_session", "light".to_owned(), light.swap_remove(0).to_vec()));
+
     for (name, json) in [("targets", TARGETS_JSON), ("rotations", ROTATIONS_JSON)] {
         seeds.push(("read_camera_path", name.to_owned(), json.as_bytes().to_vec()));
     }
@@ -134,6 +165,11 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
     seeds.push(("read_weights", "table".to_owned(), crate::weights::table().into_bytes()));
     seeds.extend(scenes.map(|(name, bytes)| ("load_scene", name.to_owned(), bytes)));
     seeds
+}
+
+/// A scene file with one of each thing.
+pub(crate) fn small_scene() -> Vec<u8> {
+    scenes::glb()
 }
 
 /// Frames, payloads and a body of the paper's cells.

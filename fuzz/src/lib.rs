@@ -8,6 +8,7 @@ mod cells;
 pub mod corpus;
 mod frame;
 mod input;
+mod live;
 mod recording;
 mod scene;
 mod session;
@@ -18,6 +19,7 @@ pub use camera_path::read_camera_path;
 pub use cells::decode_cells;
 pub use frame::decode_frame;
 pub use input::Random;
+pub use live::live_session;
 pub use recording::read_recording;
 pub use scene::load_scene;
 pub use session::session_ops;
@@ -28,10 +30,11 @@ pub use weights::read_weights;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 8] = [
+pub const TARGETS: [Target; 9] = [
     ("decode_frame", decode_frame),
     ("decode_cells", decode_cells),
     ("session_ops", session_ops),
+    ("live_session", live_session),
     ("read_recording", read_recording),
     ("load_scene", load_scene),
     ("read_camera_path", read_camera_path),

@@ -1,12 +1,14 @@
 //! Command-line arguments.
 
 pub(crate) mod bake;
+mod bench;
 mod bit_rate;
 mod eval;
 mod serve;
 mod verbs;
 mod view;
 mod watch;
+mod worker;
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -15,12 +17,14 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
 
 pub(crate) use bake::BakeArgs;
+pub(crate) use bench::{Bench, BenchArgs, JoinArgs, ServedArgs, SoakArgs, ViewersArgs};
 pub(crate) use bit_rate::BitRate;
 pub(crate) use eval::{EvalArgs, Options, ScenesArgs};
 pub(crate) use serve::{LogFormat, Named, ServeArgs};
 pub(crate) use verbs::{CompareArgs, DiffArgs, ErrorMap, EvalVerb, JudgeArgs, PictureFormat, ReferenceArgs};
 pub(crate) use view::{Preset, ViewArgs, ViewKind};
 pub(crate) use watch::{DemoArgs, InspectArgs, LightArgs, RecordArgs};
+pub(crate) use worker::WorkerArgs;
 
 /// Ray-traced ambient visibility, computed once on a server and streamed to thin clients.
 #[derive(Debug, Parser)]
@@ -62,6 +66,11 @@ pub(crate) enum Command {
     /// Light a scene for any number of viewers, live: browsers and `dapple view --url`.
     #[command(after_help = serve::SERVE_EXAMPLES)]
     Serve(Box<ServeArgs>),
+    /// Trace some instances of a scene for a server elsewhere (dapple serve --workers).
+    #[command(after_help = worker::WORKER_EXAMPLES)]
+    Worker(WorkerArgs),
+    /// Measure a live server: viewers, joining, and a long run.
+    Bench(BenchArgs),
 }
 
 const RENDER_EXAMPLES: &str = "\

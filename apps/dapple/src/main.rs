@@ -5,6 +5,7 @@ mod say;
 
 mod args;
 mod bake;
+mod bench;
 mod demo;
 mod eval;
 mod exr_file;
@@ -13,6 +14,7 @@ mod inspect;
 mod judge;
 mod light;
 mod listen;
+mod live;
 mod page;
 mod picture;
 mod progress;
@@ -23,6 +25,7 @@ mod serve;
 mod source;
 mod transport;
 mod view;
+mod worker;
 
 use std::io::IsTerminal;
 use std::process::ExitCode;
@@ -47,11 +50,13 @@ fn main() -> ExitCode {
 fn log(command: &Command) {
     let (level, format) = match command {
         Command::Serve(args) => ("info", args.log_format),
+        Command::Worker(_) => ("info", LogFormat::Text),
         _ => ("warn", LogFormat::Text),
     };
     let filter = tracing_subscriber::EnvFilter::try_from_env("DAPPLE_LOG")
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(level));
-    let lines = tracing_subscriber::fmt().with_env_filter(filter).with_target(false).with_writer(std::io::stderr);
+    let lines =
+        tracing_subscriber::fmt().with_env_filter(filter).with_target(false).with_writer(std::io::stderr);
     match format {
         LogFormat::Json => lines.json().init(),
         LogFormat::Text => lines.with_ansi(std::io::stderr().is_terminal()).without_time().init(),
@@ -80,6 +85,8 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Scene(_) | Command::Inspect(_) | Command::Demo(_) | Command::View(_) => 0,
         // Its light has threads of its own.
         Command::Serve(args) => return serve::run(args),
+        Command::Bench(args) => return bench::run(args),
+        Command::Worker(args) => return worker::run(args),
     };
     if threads > 1024 {
         anyhow::bail!("--threads is {threads}, must be 0 (one for each core) to 1024");
@@ -96,5 +103,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Demo(args) => demo::run(&args),
         Command::View(args) => view::run(&args),
         Command::Serve(args) => serve::run(&args),
+        Command::Bench(args) => bench::run(&args),
+        Command::Worker(args) => worker::run(&args),
     })
 }

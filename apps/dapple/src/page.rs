@@ -125,7 +125,8 @@ mod tests {
     #[test]
     fn other_settings_are_left_to_the_page() {
         let json = br#"{"scene": "a.glb", "stream": "a.dapple", "method": "none", "paused": true}"#;
-        let expected = ViewerJson { scene: "a.glb".into(), stream: Some("a.dapple".into()), ..ViewerJson::default() };
+        let expected =
+            ViewerJson { scene: "a.glb".into(), stream: Some("a.dapple".into()), ..ViewerJson::default() };
         assert_eq!(ViewerJson::parse(json).unwrap(), expected);
         assert_eq!(ViewerJson::parse(&serde_json::to_vec(&expected).unwrap()).unwrap(), expected);
         assert!(ViewerJson::parse(br#"{"stream": "a.dapple"}"#).is_err());

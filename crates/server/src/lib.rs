@@ -6,6 +6,7 @@
 
 pub mod paper;
 mod population;
+pub mod shards;
 mod streams;
 
 use std::sync::Arc;
@@ -23,6 +24,7 @@ use dapple_trace::psao::paper::PaperError;
 use dapple_trace::psao::update::{StepCounts, StepInput, UpdateError, UpdateParams, Updater};
 
 use population::Population;
+use shards::Shard;
 use streams::Stream;
 
 /// Settings of a server. Each group documents its own ranges and defaults.
@@ -44,6 +46,8 @@ pub struct ServerConfig {
     /// ([`StepInput::interest`]). Then the scene may have more than [`GenerateParams::max_points`] in all; at most so many at a time.
     /// Default `None`: all points of all instances are there from the start to the end.
     pub max_resident_points: Option<u32>,
+    /// The part of the scene that this server lights; default `None`: all of it.
+    pub shard: Option<Shard>,
 }
 
 impl ServerConfig {
@@ -52,6 +56,14 @@ impl ServerConfig {
     /// # Errors
     /// What [`Server::new`] would say.
     pub fn check(&self, scene: &Scene) -> Result<(), ServerError> {
+        if let Some(Shard { number, of }) = self.shard {
+            if number >= of || of > Shard::MOST {
+                return Err(ServerError::BadShard { number, of });
+            }
+            if self.generate.adaptive > 0.0 || self.max_resident_points.is_some() {
+                return Err(ServerError::UnevenShard);
+            }
+        }
         match self.max_resident_points {
             None => check_density(scene, &self.generate)?,
             Some(points) if !(1..=self.generate.max_points).contains(&points) => {
@@ -73,6 +85,7 @@ impl Default for ServerConfig {
             bits_per_s: None,
             cuts: true,
             max_resident_points: None,
+            shard: None,
         }
     }
 }
@@ -111,6 +124,20 @@ pub enum ServerError {
          leave out one of them (--adaptive, --max-points)"
     )]
     AdaptiveCap,
+    /// A part that does not exist.
+    #[error("part {number} of {of}: parts count from 0, and there are 1 to {most}", most = Shard::MOST)]
+    BadShard {
+        /// Which.
+        number: u32,
+        /// Of how many.
+        of: u32,
+    },
+    /// A part of a scene with settings that are weighed over all of it.
+    #[error(
+        "density that follows visibility, or a cap on points, is weighed over the whole scene, so neither goes with parts of it: leave \
+         out --adaptive and --max-points"
+    )]
+    UnevenShard,
     /// Points that came did not fit those that there are.
     #[error(transparent)]
     Layout(#[from] LayoutError),
@@ -180,6 +207,9 @@ impl Server {
     ) -> Result<Server, ServerError> {
         let pose = scene.pose(0.0);
         let tracer = Tracer::new(&scene, &pose);
+        if config.shard.is_some() {
+            config.check(&scene)?;
+        }
         if let Some(most_points) = config.max_resident_points {
             config.check(&scene)?;
             let mut population = Population::new(&scene, pose.clone(), tracer.clone(), config, most_points)?;
@@ -189,6 +219,14 @@ impl Server {
             let mut server = Server::with_points(scene, pose, tracer, points, config, progress)?;
             server.population = Some(population);
             return Ok(server);
+        }
+        if let Some(shard) = config.shard {
+            let layer = PointLayer::new(&scene, &config.generate)?;
+            let own = shard.instances(&scene, &config.generate)?;
+            progress(Progress::Laying(0, 1));
+            let points = layer.lay(&scene, &pose, &tracer, &own)?;
+            progress(Progress::Laying(1, 1));
+            return Server::with_points(scene, pose, tracer, points, config, progress);
         }
         let instances = scene.instances.len();
         let laying = |done| progress(Progress::Laying(done, instances));

@@ -1,6 +1,6 @@
 //! The same light under different budgets of bits.
 
-use dapple_stream::{Budget, Frame, FrameKind, Publisher, Spending};
+use dapple_stream::{Budget, Frame, Publisher, Spending};
 use dapple_trace::psao::update::ConvexVolume;
 
 use crate::Server;
@@ -22,18 +22,18 @@ impl Server {
         self.streams.len() - 1
     }
 
+    /// How many streams there are.
+    pub fn streams(&self) -> usize {
+        self.streams.len()
+    }
+
     /// Publishes what was traced in a stream, with a budget that goes by `sent_s` (seconds, never falling) and is spent by what viewers see.
     /// Nothing where there is nothing to say.
     pub fn publish_stream(&mut self, stream: usize, sent_s: f64, interest: &[ConvexVolume]) -> Option<Frame> {
-        let Stream { publisher, budget } = &mut self.streams[stream];
-        let Some(budget) = budget else { return publisher.publish(self.updater.store()) };
-        let coarseness = self.updater.coarseness(interest, Spending::STRETCH);
-        let most_bytes = Some(budget.allowance(sent_s));
-        let spending = Spending { most_bytes, coarseness: &coarseness };
-        let frame = publisher.publish_within(self.updater.store(), &spending);
-        let sent = frame.as_ref().filter(|frame| frame.kind == FrameKind::Delta);
-        budget.spend(sent.map_or(0, |frame| frame.bytes.len()));
-        frame
+        let is_limited = self.streams[stream].budget.is_some();
+        let coarseness =
+            if is_limited { self.updater.coarseness(interest, Spending::STRETCH) } else { Vec::new() };
+        self.streams[stream].publish(self.updater.store(), &coarseness, sent_s)
     }
 
     /// The snapshot that brings a subscriber of a stream up to date. Encoded at most once an update.

@@ -23,10 +23,11 @@ mod light;
 mod message;
 #[cfg(test)]
 mod tests;
+pub mod work;
 
 pub use clock::SceneClock;
 pub use guest::{Guest, GuestConfig, GuestError, News};
-pub use light::{CHUNK_BYTES, LightHead, MAX_LIGHT_MESSAGE_BYTES};
+pub use light::{Assembled, Assembly, CHUNK_BYTES, LightHead, MAX_LIGHT_MESSAGE_BYTES};
 pub use message::{
     Event, FromHost, FromViewer, Held, Hello, Look, LookCamera, MAX_FROM_HOST_BYTES, MAX_FROM_VIEWER_BYTES,
     MessageError, PROTOCOL, Reason, Refusal, Role, Status, Welcome,

@@ -85,52 +85,61 @@ impl LightHead {
     }
 }
 
-/// Puts pieces together that come in order; whatever does not follow starts anew or is dropped.
+/// Puts pieces together, in whatever order they come.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Assembly {
+pub struct Assembly {
+    /// Of the frame that is being put together; its offset is 0.
     head: LightHead,
     bytes: Vec<u8>,
+    /// Which pieces have come, and how many bytes that is.
+    has: Vec<bool>,
+    came: usize,
 }
 
 /// What a piece came to.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Assembled {
+pub enum Assembled {
     /// A whole frame (empty for none).
     Whole(LightHead, Vec<u8>),
-    /// More is to come.
+    /// More is to come, or it has come before.
     Part,
-    /// It does not follow what came before: something was lost on the way.
-    Gap,
+    /// It cannot be part of a frame that is taken.
+    Never,
 }
 
 impl Assembly {
     /// Takes the next piece of frames that have at most so many bytes.
-    pub(crate) fn push(&mut self, head: LightHead, piece: &[u8], max_bytes: usize) -> Assembled {
-        if head.total as usize > max_bytes {
-            self.bytes.clear();
-            return Assembled::Gap;
+    pub fn push(&mut self, head: LightHead, piece: &[u8], max_bytes: usize) -> Assembled {
+        let (total, offset) = (head.total as usize, head.offset as usize);
+        let fits = offset.is_multiple_of(CHUNK_BYTES) && piece.len() == CHUNK_BYTES.min(total - offset);
+        if total > max_bytes || !fits {
+            return Assembled::Never;
         }
-        if head.offset == 0 {
-            // What was begun is never finished then.
-            self.bytes.clear();
-            self.head = head;
-        } else {
-            let same = LightHead { offset: self.head.offset, ..head } == self.head;
-            if !same || head.offset as usize != self.bytes.len() {
-                self.bytes.clear();
-                return Assembled::Gap;
+        if total <= CHUNK_BYTES {
+            // It is whole by itself, whatever else is on its way.
+            return Assembled::Whole(head, piece.to_vec());
+        }
+        let frame = LightHead { offset: 0, ..head };
+        if frame != self.head || self.bytes.is_empty() {
+            if !self.bytes.is_empty() && frame.made_us < self.head.made_us {
+                return Assembled::Part;
             }
+            let pieces = total.div_ceil(CHUNK_BYTES);
+            (self.head, self.bytes, self.has, self.came) = (frame, vec![0; total], vec![false; pieces], 0);
         }
-        self.bytes.extend_from_slice(piece);
-        if self.bytes.len() < head.total as usize {
+        self.bytes[offset..offset + piece.len()].copy_from_slice(piece);
+        if !std::mem::replace(&mut self.has[offset / CHUNK_BYTES], true) {
+            self.came += piece.len();
+        }
+        if self.came < total {
             return Assembled::Part;
         }
         Assembled::Whole(self.head, std::mem::take(&mut self.bytes))
     }
 
     /// Bytes of an unfinished frame that have come, and all of it.
-    pub(crate) fn progress(&self) -> (usize, usize) {
-        if self.bytes.is_empty() { (0, 0) } else { (self.bytes.len(), self.head.total as usize) }
+    pub fn progress(&self) -> (usize, usize) {
+        if self.bytes.is_empty() { (0, 0) } else { (self.came, self.bytes.len()) }
     }
 }
 
@@ -142,7 +151,8 @@ mod tests {
     fn frames_of_every_length_come_through() {
         for length in [0, 1, CHUNK_BYTES - 1, CHUNK_BYTES, CHUNK_BYTES + 1, 3 * CHUNK_BYTES] {
             let frame: Vec<u8> = (0..length).map(|i| (i * 7 % 251) as u8).collect();
-            let head = LightHead { stamp_us: 5, made_us: 9, scene_us: 1 << 40, state: 3, total: 0, offset: 0 };
+            let head =
+                LightHead { stamp_us: 5, made_us: 9, scene_us: 1 << 40, state: 3, total: 0, offset: 0 };
             let messages = head.messages(&frame);
             assert!(messages.iter().all(|message| message.len() <= MAX_LIGHT_MESSAGE_BYTES));
             let mut assembly = Assembly::default();
@@ -161,22 +171,27 @@ mod tests {
     }
 
     #[test]
-    fn pieces_that_do_not_follow_are_no_frame() {
-        let frame = vec![1; 3 * CHUNK_BYTES];
-        let messages = LightHead::default().messages(&frame);
+    fn pieces_come_in_any_order() {
+        let frame: Vec<u8> = (0..3 * CHUNK_BYTES - 5).map(|i| (i % 251) as u8).collect();
+        let old = LightHead { made_us: 5, ..LightHead::default() }.messages(&frame);
+        let new = LightHead { made_us: 6, ..LightHead::default() }.messages(&frame);
+        let small = LightHead { made_us: 7, ..LightHead::default() }.messages(&[1, 2]);
         let mut assembly = Assembly::default();
-        let mut push = |index: usize| {
-            let (head, piece) = LightHead::parse(&messages[index]).unwrap();
+        let mut push = |message: &[u8]| {
+            let (head, piece) = LightHead::parse(message).unwrap();
             assembly.push(head, piece, 1 << 20)
         };
-        assert_eq!(push(0), Assembled::Part);
-        assert_eq!(push(2), Assembled::Gap);
-        assert_eq!(push(1), Assembled::Gap);
-        assert_eq!(push(0), Assembled::Part);
-        assert_eq!(push(1), Assembled::Part);
-        assert!(matches!(push(2), Assembled::Whole(..)));
-        let (head, piece) = LightHead::parse(&messages[0]).unwrap();
-        assert_eq!(Assembly::default().push(head, piece, 1000), Assembled::Gap, "larger than is taken");
+        assert_eq!(push(&old[2]), Assembled::Part);
+        assert_eq!(push(&old[2]), Assembled::Part, "twice");
+        assert_eq!(push(&new[1]), Assembled::Part, "the newer one counts");
+        assert_eq!(push(&old[1]), Assembled::Part);
+        assert!(matches!(push(&small[0]), Assembled::Whole(_, bytes) if bytes == [1, 2]));
+        assert_eq!(push(&new[2]), Assembled::Part);
+        assert!(matches!(push(&new[0]), Assembled::Whole(_, bytes) if bytes == frame));
+        let (head, piece) = LightHead::parse(&old[0]).unwrap();
+        assert_eq!(Assembly::default().push(head, piece, 1000), Assembled::Never, "larger than is taken");
+        let shifted = LightHead { offset: 1, ..head };
+        assert_eq!(Assembly::default().push(shifted, piece, 1 << 20), Assembled::Never);
     }
 
     #[test]

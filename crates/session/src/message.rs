@@ -172,7 +172,7 @@ impl LookCamera {
         }
     }
 
-    fn check(&self) -> Result<(), MessageError> {
+    pub(crate) fn check(&self) -> Result<(), MessageError> {
         let numbers = [self.eye, self.forward, self.up];
         let usable = numbers.iter().flatten().all(|number| number.is_finite() && number.abs() <= 1e6);
         if !(usable && self.axes().is_some()) {
@@ -399,7 +399,7 @@ pub struct Status {
     pub waiting: u32,
 }
 
-fn check_length(text: &str, limit: usize) -> Result<(), MessageError> {
+pub(crate) fn check_length(text: &str, limit: usize) -> Result<(), MessageError> {
     if text.len() > limit {
         return Err(MessageError::TooLong { bytes: text.len(), limit });
     }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
+use dapple_server::shards::Shard;
 use dapple_session::Role;
 
 use super::{BitRate, LightArgs, SceneChoice};
@@ -42,8 +43,20 @@ pub(crate) struct ServeArgs {
     pub(crate) record: Option<PathBuf>,
     /// A secret and what it allows: view=SECRET or interact=SECRET. Without any, everyone may do everything; with one for interact alone, the
     /// others may look.
-    #[arg(long, value_name = "ROLE=SECRET", env = "DAPPLE_TOKENS", value_delimiter = ' ', hide_env_values = true)]
+    #[arg(
+        long,
+        value_name = "ROLE=SECRET",
+        env = "DAPPLE_TOKENS",
+        value_delimiter = ' ',
+        hide_env_values = true
+    )]
     pub(crate) token: Vec<Token>,
+    /// Trace nothing here, but put together what so many workers trace (dapple worker).
+    #[arg(long, value_name = "N", conflicts_with_all = ["max_points", "threads"])]
+    pub(crate) workers: Option<u32>,
+    /// A secret that workers must give.
+    #[arg(long, value_name = "SECRET", env = "DAPPLE_WORKER_TOKEN", hide_env_values = true)]
+    pub(crate) worker_token: Option<String>,
     /// Most viewers at a time.
     #[arg(long, value_name = "N", default_value_t = 1000)]
     pub(crate) max_viewers: u32,
@@ -113,6 +126,30 @@ impl FromStr for Token {
     }
 }
 
+/// Which part of a scene's instances, and of how many: K/N, from 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct ShardText(pub(crate) Shard);
+
+impl FromStr for ShardText {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let usage = || {
+            format!(
+                "write K/N, as in 1/3: the first of three parts, of which there are at most {}",
+                Shard::MOST
+            )
+        };
+        let (number, of) = text.split_once('/').ok_or_else(usage)?;
+        let number: u32 = number.parse().map_err(|_| usage())?;
+        let of: u32 = of.parse().map_err(|_| usage())?;
+        if number == 0 || number > of || of > Shard::MOST {
+            return Err(usage());
+        }
+        Ok(ShardText(Shard { number: number - 1, of }))
+    }
+}
+
 /// NAME=VALUE.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Named<T> {
@@ -142,6 +179,14 @@ mod tests {
         assert!(!format!("{token:?}").contains("a=b"));
         for bad in ["", "view", "view=", "root=x", "=x"] {
             assert!(bad.parse::<Token>().is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn parts_count_from_one() {
+        assert_eq!("2/3".parse::<ShardText>().unwrap().0, Shard { number: 1, of: 3 });
+        for bad in ["0/3", "4/3", "1/0", "1", "1/1000", "-1/2", "a/b"] {
+            assert!(bad.parse::<ShardText>().is_err(), "{bad}");
         }
     }
 

@@ -14,7 +14,7 @@ Examples:
   dapple view room.glb                           lights the room while you walk through it
   dapple view --builtin atrium --detail 0.5 --points 256 --hz 5
   dapple view room.glb --stream room.dapple      plays a recording (dapple record)
-  dapple view --url http://127.0.0.1:8000/       what a page there shows (dapple demo)
+  dapple view --url http://127.0.0.1:8000/       what a page there shows (dapple demo), or a live session (dapple serve)
   dapple view room.glb --camera walk.json        along a camera path that was recorded (R) or written by hand
   dapple view --builtin atrium --headless --frames 8 --view texels --size 640x360 -o out/texels
 
@@ -24,9 +24,12 @@ In the window H or F1 lists the keys.";
 pub(crate) struct ViewArgs {
     #[command(flatten)]
     pub(crate) scene: SceneChoice,
-    /// Folder of a page (its viewer.json, scene and recording), over plain HTTP.
+    /// Folder of a page (its viewer.json, scene and recording or live session), over plain HTTP.
     #[arg(long, value_name = "URL", conflicts_with_all = ["scene", "builtin", "detail", "stream"])]
     pub(crate) url: Option<String>,
+    /// What gives more rights in a live session, where its host asks for that (dapple serve --token).
+    #[arg(long, value_name = "SECRET", requires = "url", env = "DAPPLE_TOKEN", hide_env_values = true)]
+    pub(crate) token: Option<String>,
     /// Recording to play; without it the scene is lit while it is shown.
     #[arg(long, value_name = "FILE.dapple", conflicts_with_all = ["points", "hz"])]
     pub(crate) stream: Option<PathBuf>,

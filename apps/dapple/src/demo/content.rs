@@ -44,7 +44,8 @@ pub(super) fn make(args: &DemoArgs) -> Result<()> {
     let _ = std::fs::remove_file(args.out.join(MADE));
     write_file(&args.out.join(SCENE), &glb)?;
     write_file(&args.out.join(STREAM), &taken.bytes)?;
-    let json = ViewerJson { scene: SCENE.to_owned(), stream: Some(STREAM.to_owned()), ..ViewerJson::default() };
+    let json =
+        ViewerJson { scene: SCENE.to_owned(), stream: Some(STREAM.to_owned()), ..ViewerJson::default() };
     write_file(&args.out.join(FILE_NAME), &serde_json::to_vec_pretty(&json)?)?;
     write_file(&args.out.join(MADE), key.as_bytes())?;
     say!(

@@ -105,7 +105,11 @@ async fn serve(stream: TcpStream, router: Router, tls: Option<TlsAcceptor>, perm
     }
 }
 
-async fn http(stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, router: Router, permit: OwnedSemaphorePermit) {
+async fn http(
+    stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
+    router: Router,
+    permit: OwnedSemaphorePermit,
+) {
     // The permit goes with what is served over the connection: an upgraded one outlives this function.
     let permit: Permit = Arc::new(permit);
     let router = router.layer(axum::Extension(permit));

@@ -4,21 +4,39 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
-use dapple_server::{Progress, Server, ServerConfig};
-use dapple_session::Status;
+use anyhow::Result;
+use dapple_scene::Edits;
+use dapple_server::shards::Merger;
+use dapple_server::{Progress, Server, ServerConfig, StepReport};
 use dapple_session::host::Tick;
+use dapple_session::{LookCamera, Status};
+use dapple_stream::{Frame, Limits};
 use dapple_trace::psao::update::{ConvexVolume, StepInput};
 
 use super::hub::{Hub, Phase};
 use super::ration::Ration;
 use super::recording::LiveRecording;
+use super::work::Workforce;
 
 /// Most views that a step looks through; where there are more viewers, others each time.
 const MOST_VIEWS: usize = 32;
 
 /// What comes into view before the next step, metres around what is seen.
-const MARGIN_M: f32 = 0.5;
+pub(crate) const MARGIN_M: f32 = 0.5;
+
+/// Where light comes from.
+enum Light {
+    Here(Box<Server>),
+    Workers(Box<Merger>, Workforce, Duration),
+}
+
+/// What a step made: a frame for each stream that wants one.
+struct Made {
+    report: StepReport,
+    frames: Vec<Option<Frame>>,
+    /// The host's clock once the full stream's frame was there.
+    made_us: u64,
+}
 
 /// How a scene is lit while it is served.
 pub(crate) struct Engine {
@@ -28,6 +46,8 @@ pub(crate) struct Engine {
     pub(crate) hz: f64,
     pub(crate) ration: Ration,
     pub(crate) recording: Option<LiveRecording>,
+    /// Who traces, if that is not this program, and how long a step waits for them.
+    pub(crate) workers: Option<(Workforce, Duration)>,
     pub(crate) stop: Arc<AtomicBool>,
 }
 
@@ -46,28 +66,7 @@ impl Engine {
     }
 
     fn light(&mut self) -> Result<()> {
-        let hub = self.hub.clone();
-        let scene = hub.host().scene().clone();
-        let part = |done: usize, of: usize| (1000 * done / of.max(1)) as u32;
-        let progress = |progress| {
-            hub.set_phase(match progress {
-                Progress::Laying(done, of) => Phase::Starting("laying points", part(done, of)),
-                Progress::Tracing(done, of) => Phase::Starting("tracing points", part(done, of)),
-                Progress::Cutting(done, of) => Phase::Starting("finding what stands between", part(done, of)),
-            });
-        };
-        let started = Instant::now();
-        let mut server = Server::new(scene, &self.config, &progress)?;
-        let rungs = hub.host().config().rungs.clone();
-        for bits_per_s in rungs.iter().skip(1) {
-            server.add_stream(*bits_per_s);
-        }
-        tracing::info!(
-            points = server.store().layout().len(),
-            seconds = started.elapsed().as_secs_f64(),
-            "the light is there"
-        );
-        hub.set_phase(Phase::Serving);
+        let mut light = self.start()?;
         let period = Duration::from_secs_f64(1.0 / self.hz);
         let mut due = Instant::now();
         let mut turn = 0;
@@ -79,13 +78,48 @@ impl Engine {
             let is_late = now > due + period;
             // Steps that were missed are not made up for.
             due = if is_late { Instant::now() + period } else { due + period };
-            self.step(&mut server, turn, is_late)?;
+            self.step(&mut light, turn, is_late)?;
             turn += 1;
         }
         Ok(())
     }
 
-    fn step(&mut self, server: &mut Server, turn: u64, is_late: bool) -> Result<()> {
+    fn start(&mut self) -> Result<Light> {
+        let hub = self.hub.clone();
+        let (scene, rungs) = {
+            let host = hub.host();
+            (host.scene().clone(), host.config().rungs.clone())
+        };
+        if let Some((workforce, patience)) = self.workers.take() {
+            let most = u32::try_from(scene.instances.len()).unwrap_or(u32::MAX);
+            let limits = Limits::default();
+            let limits = Limits { max_sets: limits.max_sets.max(most), ..limits };
+            let (parts, publish) = (workforce.parts() as u32, self.config.publish);
+            let mut merger = Merger::new(&scene, parts, publish, self.config.bits_per_s, limits);
+            for bits_per_s in rungs.iter().skip(1) {
+                merger.add_stream(*bits_per_s);
+            }
+            return Ok(Light::Workers(Box::new(merger), workforce, patience));
+        }
+        let part = |done: usize, of: usize| (1000 * done / of.max(1)) as u32;
+        let progress = |progress| {
+            hub.set_phase(match progress {
+                Progress::Laying(done, of) => Phase::Starting("laying points", part(done, of)),
+                Progress::Tracing(done, of) => Phase::Starting("tracing points", part(done, of)),
+                Progress::Cutting(done, of) => Phase::Starting("finding what stands between", part(done, of)),
+            });
+        };
+        let started = Instant::now();
+        let mut server = Server::new(scene, &self.config, &progress)?;
+        for bits_per_s in rungs.iter().skip(1) {
+            server.add_stream(*bits_per_s);
+        }
+        let (points, seconds) = (server.store().layout().len(), started.elapsed().as_secs_f64());
+        tracing::info!(points, seconds, "the light is there");
+        Ok(Light::Here(Box::new(server)))
+    }
+
+    fn step(&mut self, light: &mut Light, turn: u64, is_late: bool) -> Result<()> {
         let hub = self.hub.clone();
         let (tick, looks, watched) = {
             let mut host = hub.host();
@@ -95,46 +129,39 @@ impl Engine {
             (tick, host.looks(MOST_VIEWS, turn), watched)
         };
         if let Some(edits) = &tick.edits {
-            server.set_edits(edits.clone());
+            light.set_edits(edits);
         }
-        if !watched.contains(&true) && self.recording.is_none() {
+        self.hub.set_phase(light.phase());
+        if !watched.contains(&true) && self.recording.is_none() && light.is_warm() {
+            light.idle();
             // Nobody looks. Who comes gets what has changed since with the next step.
             hub.step_done();
             return Ok(());
         }
-        let interest: Vec<ConvexVolume> = looks
-            .iter()
-            .map(|look| ConvexVolume::frustum(&look.posed(), look.aspect, f32::INFINITY, MARGIN_M))
-            .collect();
         let start = Instant::now();
-        let input = StepInput { ray_budget: self.ration.rays(), interest: &interest };
-        let (scene_s, sent_s) = (tick.scene_us as f64 * 1e-6, tick.stamp_us as f64 * 1e-6);
-        let report = server.step_at(scene_s, sent_s, &input)?;
-        let made_us = hub.now_us();
-        let frames: Vec<_> = (1..watched.len())
-            .map(|rung| {
-                // Changes of sets must be told in the step in which they happen, whether anyone listens or not.
-                let publishes = watched[rung] || report.spawned > 0 || report.evicted > 0;
-                publishes.then(|| server.publish_stream(rung, sent_s, &interest)).flatten()
-            })
-            .collect();
+        // Stream 0 goes into a recording, watched or not.
+        let wants = |rung: usize| rung == 0 || watched[rung];
+        let Made { report, frames, made_us } = light.step(&hub, &tick, looks, self.ration.rays(), &wants)?;
         let took_us = start.elapsed().as_micros() as u64;
-        self.ration.note(report.rays, start.elapsed().as_secs_f64());
-        self.record(server, &tick, report.frame.as_ref())?;
+        if matches!(light, Light::Here(_)) {
+            self.ration.note(report.rays, start.elapsed().as_secs_f64());
+        }
+        self.record(light, &tick, frames[0].as_ref());
         let status = Status {
             ray_budget: self.ration.rays().unwrap_or(0),
             waiting: report.counts.backlog.max(report.held_back),
             ..Status::default()
         };
-        let counts = {
+        let wanted: Vec<usize> = {
             let mut host = hub.host();
-            host.publish(0, &tick, report.frame.as_ref(), made_us);
             for (rung, frame) in frames.iter().enumerate() {
-                host.publish(rung + 1, &tick, frame.as_ref(), hub.now_us());
+                host.publish(rung, &tick, frame.as_ref(), if rung == 0 { made_us } else { hub.now_us() });
             }
-            let wanted: Vec<usize> = (0..watched.len()).filter(|rung| host.wants_snapshot(*rung)).collect();
-            drop(host);
-            let snapshots: Vec<_> = wanted.iter().map(|rung| (*rung, server.join_stream(*rung))).collect();
+            (0..watched.len()).filter(|rung| host.wants_snapshot(*rung)).collect()
+        };
+        // Without the lock: a snapshot takes its time.
+        let snapshots: Vec<_> = wanted.iter().map(|rung| (*rung, light.join(*rung))).collect();
+        let ages_us = {
             let mut host = hub.host();
             for (rung, frame) in snapshots {
                 if let Some(frame) = frame {
@@ -145,26 +172,122 @@ impl Engine {
             host.take_ages()
         };
         hub.step_done();
-        hub.figures.ages(&counts);
+        hub.figures.ages(&ages_us);
         hub.figures.step(&report, took_us, hub.now_us().saturating_sub(made_us), is_late);
         hub.figures.set_ray_budget(status.ray_budget);
+        hub.figures.set_workers(light.workers());
         tracing::debug!(rays = report.rays, changed = report.changed, us = took_us, "step");
         Ok(())
     }
 
-    fn record(&mut self, server: &mut Server, tick: &Tick, frame: Option<&dapple_stream::Frame>) -> Result<()> {
-        let Some(recording) = &mut self.recording else { return Ok(()) };
-        let recorded = if recording.wants_snapshot() {
-            let joined = server.join()?.context("a server publishes as it starts")?;
-            recording.frame(tick.scene_us, &joined)
-        } else {
-            frame.map_or(Ok(()), |frame| recording.frame(tick.scene_us, frame))
+    fn record(&mut self, light: &Light, tick: &Tick, frame: Option<&Frame>) {
+        let Some(recording) = &mut self.recording else { return };
+        let joined = if recording.wants_snapshot() { light.join(0) } else { None };
+        let recorded = match joined.as_ref().or(frame) {
+            Some(frame) => recording.frame(tick.scene_us, frame),
+            None => Ok(()),
         };
         // A full disk ends the recording, not the light.
         if let Err(error) = recorded {
             tracing::error!("the recording has ended: {error:#}");
             self.recording = None;
         }
-        Ok(())
+    }
+}
+
+impl Light {
+    fn set_edits(&mut self, edits: &Edits) {
+        match self {
+            Light::Here(server) => server.set_edits(edits.clone()),
+            Light::Workers(_, workforce, _) => workforce.set_edits(edits.clone()),
+        }
+    }
+
+    fn phase(&self) -> Phase {
+        match self {
+            Light::Workers(_, workforce, _) if workforce.present() < workforce.parts() => {
+                let mille = 1000 * workforce.present() / workforce.parts();
+                Phase::Starting("waiting for workers", mille as u32)
+            }
+            _ => Phase::Serving,
+        }
+    }
+
+    /// Whether everyone who traces has begun: the first light takes long, and should not be waited for by a viewer.
+    fn is_warm(&self) -> bool {
+        match self {
+            Light::Here(_) => true,
+            Light::Workers(_, workforce, _) => workforce.is_warm(),
+        }
+    }
+
+    /// Nothing is to be lit; who comes and goes is heard all the same.
+    fn idle(&mut self) {
+        if let Light::Workers(merger, workforce, _) = self {
+            take_light(merger, workforce.idle());
+        }
+    }
+
+    fn step(
+        &mut self,
+        hub: &Hub,
+        tick: &Tick,
+        looks: Vec<LookCamera>,
+        ray_budget: Option<u64>,
+        wants: &dyn Fn(usize) -> bool,
+    ) -> Result<Made> {
+        let (scene_s, sent_s) = (tick.scene_us as f64 * 1e-6, tick.stamp_us as f64 * 1e-6);
+        match self {
+            Light::Here(server) => {
+                let interest: Vec<ConvexVolume> = looks
+                    .iter()
+                    .map(|look| ConvexVolume::frustum(&look.posed(), look.aspect, f32::INFINITY, MARGIN_M))
+                    .collect();
+                let input = StepInput { ray_budget, interest: &interest };
+                let mut report = server.step_at(scene_s, sent_s, &input)?;
+                let made_us = hub.now_us();
+                // Points that come or go must be told in their step, whether anyone listens or not.
+                let all = report.spawned > 0 || report.evicted > 0;
+                let mut frames = vec![report.frame.take()];
+                for rung in 1..server.streams() {
+                    let publishes = all || wants(rung);
+                    frames.push(publishes.then(|| server.publish_stream(rung, sent_s, &interest)).flatten());
+                }
+                Ok(Made { report, frames, made_us })
+            }
+            Light::Workers(merger, workforce, patience) => {
+                let work = workforce.step(tick, looks, *patience);
+                let mut report = StepReport { rays: work.rays, points: work.points, ..StepReport::default() };
+                report.counts.backlog = work.waiting;
+                report.changed = work.changed;
+                take_light(merger, work.light);
+                let frames = merger.publish(sent_s, wants);
+                Ok(Made { report, frames, made_us: hub.now_us() })
+            }
+        }
+    }
+
+    fn join(&self, stream: usize) -> Option<Frame> {
+        match self {
+            Light::Here(server) => server.join_stream(stream),
+            Light::Workers(merger, ..) => merger.join_stream(stream),
+        }
+    }
+
+    /// Workers that are there.
+    fn workers(&self) -> usize {
+        match self {
+            Light::Here(_) => 0,
+            Light::Workers(_, workforce, _) => workforce.present(),
+        }
+    }
+}
+
+/// Puts what workers sent into the whole. A frame that does not fit is left out: its worker's next connection begins with a snapshot.
+fn take_light(merger: &mut Merger, light: Vec<(u32, Vec<u8>)>) {
+    for (shard, frame) in light {
+        if let Err(error) = merger.receive(shard, &frame) {
+            tracing::warn!(part = shard + 1, "a worker's light does not fit: {error}");
+        }
     }
 }

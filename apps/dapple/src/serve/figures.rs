@@ -26,6 +26,7 @@ pub(crate) struct Figures {
     ray_budget: AtomicI64,
     points: AtomicI64,
     waiting: AtomicI64,
+    workers: AtomicI64,
     step_times: Histogram,
     ages: Histogram,
     newest_ages: Mutex<Newest>,
@@ -51,6 +52,7 @@ impl Default for Figures {
             ray_budget: AtomicI64::new(0),
             points: AtomicI64::new(0),
             waiting: AtomicI64::new(0),
+            workers: AtomicI64::new(0),
             step_times: Histogram::new(times),
             ages: Histogram::new(ages),
             newest_ages: Mutex::default(),
@@ -77,6 +79,10 @@ impl Figures {
         self.ray_budget.store(rays as i64, Ordering::Relaxed);
     }
 
+    pub(crate) fn set_workers(&self, workers: usize) {
+        self.workers.store(workers as i64, Ordering::Relaxed);
+    }
+
     /// Ages of light that viewers told of.
     pub(crate) fn ages(&self, ages_us: &[u32]) {
         let mut newest = self.newest_ages.lock().unwrap_or_else(PoisonError::into_inner);
@@ -93,8 +99,7 @@ impl Figures {
     }
 
     fn percentiles(&self) -> [f64; 3] {
-        let mut ages_us =
-            self.newest_ages.lock().unwrap_or_else(PoisonError::into_inner).ages_us.clone();
+        let mut ages_us = self.newest_ages.lock().unwrap_or_else(PoisonError::into_inner).ages_us.clone();
         ages_us.sort_unstable();
         [0.5, 0.95, 0.99].map(|part| {
             let at = (ages_us.len() as f64 * part) as usize;
@@ -130,11 +135,16 @@ impl Figures {
         registry.register_with_unit("stepping", "Time spent on updates", Unit::Seconds, spent);
         let spent = ConstCounter::new(seconds(&self.encoding_us));
         registry.register_with_unit("encoding_rungs", "Of it, on leaner streams", Unit::Seconds, spent);
-        let gauges: [(&str, &str, i64); 4] = [
+        let gauges: [(&str, &str, i64); 5] = [
+            ("workers", "Workers that trace for this host", self.workers.load(Ordering::Relaxed)),
             ("viewers", "Viewers connected", i64::from(host.viewers)),
             ("points", "Points that are lit", self.points.load(Ordering::Relaxed)),
             ("points_waiting", "Points that wait for rays", self.waiting.load(Ordering::Relaxed)),
-            ("ray_budget", "Rays that an update may take, 0 for no limit", self.ray_budget.load(Ordering::Relaxed)),
+            (
+                "ray_budget",
+                "Rays that an update may take, 0 for no limit",
+                self.ray_budget.load(Ordering::Relaxed),
+            ),
         ];
         for (name, help, value) in gauges {
             registry.register(name, help, ConstGauge::new(value));
@@ -163,6 +173,9 @@ impl Figures {
     }
 }
 
+/// Linux counts in hundredths of a second for programs, whatever its own clock is.
+const TICKS_PER_S: f64 = 100.0;
+
 /// Seconds of processor that this program has taken, and bytes of memory that it holds; on Linux.
 pub(crate) fn process() -> Option<(f64, u64)> {
     process_of("self")
@@ -170,8 +183,6 @@ pub(crate) fn process() -> Option<(f64, u64)> {
 
 /// The same of another program.
 pub(crate) fn process_of(id: &str) -> Option<(f64, u64)> {
-    // Linux counts in hundredths of a second for programs, whatever its own clock is.
-    const TICKS_PER_S: f64 = 100.0;
     let stat = std::fs::read_to_string(format!("/proc/{id}/stat")).ok()?;
     // The name may hold anything, but nothing after its parenthesis does.
     let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
@@ -180,6 +191,21 @@ pub(crate) fn process_of(id: &str) -> Option<(f64, u64)> {
     let resident = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
     let kib: u64 = resident.trim().trim_end_matches("kB").trim().parse().ok()?;
     Some((ticks as f64 / TICKS_PER_S, kib * 1024))
+}
+
+/// Seconds of processor that a program's threads have taken whose names begin like this.
+pub(crate) fn threads_of(id: &str, name: &str) -> Option<f64> {
+    let mut ticks = 0;
+    for task in std::fs::read_dir(format!("/proc/{id}/task")).ok()? {
+        // A thread may end while it is looked at.
+        let Ok(stat) = std::fs::read_to_string(task.ok()?.path().join("stat")) else { continue };
+        let (head, fields) = stat.rsplit_once(')')?;
+        if head.split_once('(').is_some_and(|(_, of_thread)| of_thread.starts_with(name)) {
+            let fields: Vec<&str> = fields.split_whitespace().collect();
+            ticks += fields.get(11)?.parse::<u64>().ok()? + fields.get(12)?.parse::<u64>().ok()?;
+        }
+    }
+    Some(ticks as f64 / TICKS_PER_S)
 }
 
 #[cfg(test)]

@@ -61,7 +61,7 @@ impl Hub {
     }
 
     pub(crate) fn set_phase(&self, phase: Phase) {
-        self.phase.send_replace(phase);
+        self.phase.send_if_modified(|now| std::mem::replace(now, phase.clone()) != phase);
     }
 
     pub(crate) fn phase(&self) -> Phase {
@@ -76,7 +76,8 @@ impl Hub {
     pub(crate) fn arrival(&self, is_reliable: bool) -> Result<Arrival, getrandom::Error> {
         let mut secret = [0; 16];
         getrandom::fill(&mut secret)?;
-        let unix_us = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_micros() as u64);
+        let unix_us =
+            SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_micros() as u64);
         Ok(Arrival { key: dapple_session::host::hex(&secret), is_reliable, unix_us })
     }
 }

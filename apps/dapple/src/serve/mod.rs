@@ -14,6 +14,7 @@ mod ration;
 mod recording;
 mod viewer;
 mod web;
+mod work;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,8 +22,11 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow, bail};
+use dapple_server::ServerConfig;
+use dapple_server::shards::Shard;
 use dapple_session::Role;
 use dapple_session::host::{Access, Host, HostConfig};
+use dapple_session::work::Setup;
 use dapple_stream::PublisherConfig;
 use tokio::runtime::Runtime;
 use tokio::sync::watch;
@@ -35,15 +39,22 @@ use crate::page::built_page;
 use crate::progress::Bar;
 use asset::Asset;
 use engine::Engine;
+pub(crate) use engine::MARGIN_M;
+pub(crate) use figures::{process_of, threads_of};
 use hub::{Hub, Phase};
-use ration::Ration;
+pub(crate) use ration::Ration;
 use recording::LiveRecording;
+pub(crate) use web::WORK_PATH;
+use work::{WorkHub, Workforce};
 
 /// Updates a second where none are given.
 const DEFAULT_HZ: f64 = 30.0;
 
 /// How long viewers have to go once the program is told to stop.
 const DRAIN: Duration = Duration::from_secs(5);
+
+/// How the names of threads begin that trace and encode.
+pub(crate) const LIGHT_THREADS: &str = "light";
 
 /// Connections beside those of viewers: for pages, scenes and figures.
 const OTHER_CONNECTIONS: usize = 256;
@@ -99,7 +110,23 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
         accept::listener(socket)?
     };
     let has_page = page.is_some();
-    let router = web::router(hub.clone(), asset.clone(), page);
+    let step_s = args.load / hz;
+    let (work, workers) = match args.workers {
+        Some(parts) => {
+            let (work, news) = WorkHub::new(
+                setup(&config, step_s, &light),
+                &asset.scene.hash().0,
+                parts,
+                args.worker_token.clone(),
+            );
+            let work = Arc::new(work);
+            let edits = hub.host().state().2.clone();
+            let workforce = Workforce::new(work.clone(), news, edits);
+            (Some(work), Some((workforce, Duration::from_secs_f64(step_s))))
+        }
+        None => (None, None),
+    };
+    let router = web::router(hub.clone(), asset.clone(), work, page);
     let (stop_accepting, stop) = watch::channel(false);
     let most = args.max_viewers as usize + OTHER_CONNECTIONS;
     raise_file_limit(most as u64 + 64);
@@ -107,14 +134,24 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     runtime.spawn(accept::accept(listener, router, tls, most, stop));
 
     let stop_light = Arc::new(AtomicBool::new(false));
-    let step_s = args.load / hz;
     let ration = Ration::new(step_s, light.step.ray_budget);
-    let engine = Engine { hub: hub.clone(), config, hz, ration, recording, stop: stop_light.clone() };
+    let engine =
+        Engine { hub: hub.clone(), config, hz, ration, recording, workers, stop: stop_light.clone() };
     let engine = start(engine, args.threads)?;
     let url = url_of(address, if is_secure { "https" } else { "http" });
     announce(&url, &asset, has_page, is_secure);
+    if let Some(parts) = args.workers {
+        say!("It waits for workers: dapple worker --connect {url} --shard 1/{parts}, to {parts}/{parts}\n");
+    }
+    if !address.ip().is_loopback() && args.workers.is_some() && args.worker_token.is_none() {
+        tracing::warn!(
+            "whoever reaches this address may light the scene: --worker-token SECRET keeps that to some"
+        );
+    }
     if !address.ip().is_loopback() && access.open_role() == Some(Role::Interact) {
-        tracing::warn!("whoever reaches this address may change the scene: --token interact=SECRET keeps that to some");
+        tracing::warn!(
+            "whoever reaches this address may change the scene: --token interact=SECRET keeps that to some"
+        );
     }
     let ended = wait(&runtime, &hub);
 
@@ -138,6 +175,14 @@ fn check(args: &ServeArgs) -> Result<()> {
     if args.rungs.len() > 8 {
         bail!("--rungs names {} streams, at most 8 are made", args.rungs.len());
     }
+    if args.workers.is_some_and(|parts| !(1..=Shard::MOST).contains(&parts)) {
+        bail!("--workers must be 1 to {}", Shard::MOST);
+    }
+    if args.workers.is_some() && args.light.visibility.adaptive > 0.0 {
+        bail!(
+            "--adaptive weighs density over the whole scene, which no worker sees: leave it out with --workers"
+        );
+    }
     if args.threads > 1024 {
         bail!("--threads is {}, must be 0 (one for each core) to 1024", args.threads);
     }
@@ -148,6 +193,20 @@ fn check(args: &ServeArgs) -> Result<()> {
         check_writable(path).context("--record")?;
     }
     Ok(())
+}
+
+/// What workers are told.
+fn setup(config: &ServerConfig, step_s: f64, light: &LightArgs) -> Setup {
+    Setup {
+        points_per_m2: config.generate.points_per_m2,
+        seed: config.generate.seed,
+        rays: config.update.rays,
+        rays_still: config.update.rays_still,
+        radius_m: config.update.radius_m,
+        cuts: config.cuts,
+        step_s,
+        ray_budget: light.step.ray_budget,
+    }
 }
 
 fn load(args: &ServeArgs) -> Result<Asset> {
@@ -165,10 +224,11 @@ fn rungs(full: Option<u64>, args: &ServeArgs) -> Vec<Option<u64>> {
 fn start(engine: Engine, threads: usize) -> Result<JoinHandle<Result<()>>> {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
+        .thread_name(|number| format!("{LIGHT_THREADS}-{number}"))
         .build()
         .context("cannot start the threads that trace")?;
     std::thread::Builder::new()
-        .name("light".to_owned())
+        .name(LIGHT_THREADS.to_owned())
         .spawn(move || pool.install(move || engine.run()))
         .context("cannot start the thread that lights")
 }

@@ -42,11 +42,7 @@ async fn refuse(out: &mut impl Outbound, refusal: Refusal) {
 }
 
 /// Waits for a hello and lets its viewer in.
-async fn join<O: Outbound>(
-    hub: &Hub,
-    _out: &O,
-    inbound: &mut impl Inbound,
-) -> Result<Link, Option<Refusal>> {
+async fn join<O: Outbound>(hub: &Hub, _out: &O, inbound: &mut impl Inbound) -> Result<Link, Option<Refusal>> {
     let malformed = |message: String| Some(Refusal { reason: Reason::Malformed, message });
     let message = tokio::time::timeout(HELLO_TIMEOUT, inbound.receive()).await.map_err(|_| {
         let message = format!("no hello within {} s", HELLO_TIMEOUT.as_secs());
@@ -54,7 +50,9 @@ async fn join<O: Outbound>(
     })?;
     let text = match message {
         Ok(Some(Message::Text(text))) => text,
-        Ok(Some(Message::Bytes(_))) => return Err(malformed("the first message must be a hello, in text".to_owned())),
+        Ok(Some(Message::Bytes(_))) => {
+            return Err(malformed("the first message must be a hello, in text".to_owned()));
+        }
         Ok(None) | Err(LinkError::Ended(_)) => return Err(None),
         Err(LinkError::Refused(reason)) => return Err(malformed(reason)),
     };
@@ -92,7 +90,9 @@ async fn send_all(hub: &Hub, link: Link, out: &mut impl Outbound, heard: &Notify
         let next = hub.host().next(link, hub.now_us());
         let sending = match next {
             Next::Send(Outgoing::Text(text)) => tokio::time::timeout(SEND_TIMEOUT, out.send_text(text)).await,
-            Next::Send(Outgoing::Bytes(bytes)) => tokio::time::timeout(SEND_TIMEOUT, out.send_bytes(bytes)).await,
+            Next::Send(Outgoing::Bytes(bytes)) => {
+                tokio::time::timeout(SEND_TIMEOUT, out.send_bytes(bytes)).await
+            }
             Next::Close(refusal) => return Some(refusal),
             Next::Wait => {
                 tokio::select! {

@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use axum::{Extension, Router};
 use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::{Path, State};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::get;
-use dapple_session::MAX_FROM_VIEWER_BYTES;
+use axum::{Extension, Router};
+use dapple_session::{MAX_FROM_VIEWER_BYTES, MAX_LIGHT_MESSAGE_BYTES};
 use serde_json::json;
 use tower_http::compression::CompressionLayer;
 use tower_http::services::ServeDir;
@@ -19,11 +19,15 @@ use super::accept::Permit;
 use super::asset::Asset;
 use super::hub::{Phase, SharedHub};
 use super::viewer::talk;
+use super::work::{self, WorkHub};
 use crate::page::{FILE_NAME, Spares, ViewerJson};
 use crate::transport::ws;
 
 /// Where viewers connect to.
 pub(crate) const LIVE_PATH: &str = "live";
+
+/// Where workers connect to.
+pub(crate) const WORK_PATH: &str = "work";
 
 /// Where the page's scene lies.
 const SCENE_FOLDER: &str = "scene";
@@ -32,20 +36,30 @@ const SCENE_FOLDER: &str = "scene";
 struct Shared {
     hub: SharedHub,
     asset: Arc<Asset>,
+    work: Option<Arc<WorkHub>>,
     viewer_json: Arc<str>,
 }
 
 /// Everything that is served; `page` is the built page's folder, where there is one.
-pub(crate) fn router(hub: SharedHub, asset: Arc<Asset>, page: Option<PathBuf>) -> Router {
+pub(crate) fn router(
+    hub: SharedHub,
+    asset: Arc<Asset>,
+    work: Option<Arc<WorkHub>>,
+    page: Option<PathBuf>,
+) -> Router {
     let json = ViewerJson {
         scene: format!("{SCENE_FOLDER}/{}", asset.name),
         stream: None,
         live: Some(LIVE_PATH.to_owned()),
-        animation: asset.scene.active_animation,
-        spares: asset.spares.iter().map(|spare| Spares { instance: spare.instance, count: spare.count }).collect(),
+        animation: asset.scene.active_animation.filter(|index| *index != 0),
+        spares: asset
+            .spares
+            .iter()
+            .map(|spare| Spares { instance: spare.instance, count: spare.count })
+            .collect(),
     };
     let viewer_json = serde_json::to_string_pretty(&json).expect("it is made of names and numbers").into();
-    let shared = Shared { hub, asset, viewer_json };
+    let shared = Shared { hub, asset, work, viewer_json };
     // Anyone may show the scene in a page of theirs; who may change it is a matter of tokens.
     let open = SetResponseHeaderLayer::overriding(
         header::ACCESS_CONTROL_ALLOW_ORIGIN,
@@ -57,6 +71,7 @@ pub(crate) fn router(hub: SharedHub, asset: Arc<Asset>, page: Option<PathBuf>) -
         .route(&format!("/{FILE_NAME}"), get(viewer_json_answer))
         .route(&format!("/{SCENE_FOLDER}/{{name}}"), get(scene_answer))
         .route(&format!("/{LIVE_PATH}"), get(live_answer))
+        .route(&format!("/{WORK_PATH}"), get(work_answer))
         .route("/health", get(health_answer))
         .route("/metrics", get(metrics_answer))
         .with_state(shared)
@@ -96,10 +111,7 @@ async fn scene_answer(State(shared): State<Shared>, Path(name): Path<String>, as
     let mut headers = HeaderMap::new();
     headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("model/gltf-binary"));
     headers.insert(header::VARY, HeaderValue::from_static("accept-encoding"));
-    headers.insert(
-        header::CACHE_CONTROL,
-        HeaderValue::from_static("public, max-age=31536000, immutable"),
-    );
+    headers.insert(header::CACHE_CONTROL, HeaderValue::from_static("public, max-age=31536000, immutable"));
     match asset.gzip.clone().filter(|_| takes_gzip) {
         Some(packed) => {
             headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
@@ -125,6 +137,24 @@ async fn live_answer(
             talk(shared.hub, out, inbound).await;
             drop(permit);
         })
+}
+
+async fn work_answer(
+    State(shared): State<Shared>,
+    Extension(permit): Extension<Permit>,
+    upgrade: WebSocketUpgrade,
+) -> Response {
+    let Some(hub) = shared.work else {
+        let message = "this server traces by itself: start it with --workers to have others trace\n";
+        return (StatusCode::NOT_FOUND, message).into_response();
+    };
+    upgrade.max_message_size(MAX_LIGHT_MESSAGE_BYTES).max_frame_size(MAX_LIGHT_MESSAGE_BYTES).on_upgrade(
+        async move |socket| {
+            let (out, inbound) = ws::accepted(socket);
+            work::talk(hub, out, inbound).await;
+            drop(permit);
+        },
+    )
 }
 
 async fn health_answer(State(shared): State<Shared>) -> Response {

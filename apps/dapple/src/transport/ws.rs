@@ -73,10 +73,13 @@ impl Inbound for ServerIn {
 type ClientSocket = WebSocketStream<MaybeTlsStream<TcpStream>>;
 
 /// Connects to a host at `ws://…`.
-pub(crate) async fn connect(address: &str, max_message_bytes: usize) -> Result<(ClientOut, ClientIn), LinkError> {
-    let request = address.into_client_request().map_err(|error| {
-        LinkError::Refused(format!("{address} is no address of a host: {error}"))
-    })?;
+pub(crate) async fn connect(
+    address: &str,
+    max_message_bytes: usize,
+) -> Result<(ClientOut, ClientIn), LinkError> {
+    let request = address
+        .into_client_request()
+        .map_err(|error| LinkError::Refused(format!("{address} is no address of a host: {error}")))?;
     let config = WebSocketConfig::default()
         .max_message_size(Some(max_message_bytes))
         .max_frame_size(Some(max_message_bytes));

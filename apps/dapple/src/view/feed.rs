@@ -10,8 +10,10 @@ use dapple_stream::{FrameHeader, Limits, Recording, Replay};
 
 use super::fetch::Piece;
 use super::live::{Live, Start};
+use super::remote::Remote;
 use crate::inspect::MAX_RECORDING_BYTES;
 use crate::light::microseconds;
+use crate::live::LinkState;
 use crate::source::read_limited;
 
 /// What lights the scene.
@@ -22,6 +24,8 @@ pub(super) enum Feed {
     Live(Live),
     /// A recording.
     Recorded(Player),
+    /// A live session of another program.
+    Remote(Remote),
 }
 
 /// A recording that is played, and perhaps still fetched.
@@ -113,7 +117,8 @@ impl Feed {
     /// stays.
     pub(super) fn poll(&mut self, time_s: f64) -> Result<Vec<Arc<[u8]>>> {
         let failure = match self {
-            Feed::None => None,
+            // What a session brings is asked for by itself: it comes with more than frames.
+            Feed::None | Feed::Remote(_) => None,
             Feed::Live(live) => {
                 let frames = live.poll(time_s);
                 match live.progress() {
@@ -135,10 +140,20 @@ impl Feed {
         }
     }
 
-    /// Says how the viewer looks.
-    pub(super) fn look(&mut self, camera: &PosedCamera) {
-        if let Feed::Live(live) = self {
-            live.look(camera);
+    /// Says how the viewer looks, in a picture of that aspect ratio.
+    pub(super) fn look(&mut self, camera: &PosedCamera, aspect: f32) {
+        match self {
+            Feed::Live(live) => live.look(camera),
+            Feed::Remote(remote) => remote.look(camera, aspect),
+            Feed::None | Feed::Recorded(_) => {}
+        }
+    }
+
+    /// The session, if it is one.
+    pub(super) fn remote(&mut self) -> Option<&mut Remote> {
+        match self {
+            Feed::Remote(remote) => Some(remote),
+            _ => None,
         }
     }
 
@@ -153,7 +168,7 @@ impl Feed {
     /// The frames that bring a viewer to `time_s`, however long that takes.
     pub(super) fn wait_until(&mut self, time_s: f64, progress: &dyn Fn(&Start)) -> Result<Vec<Arc<[u8]>>> {
         match self {
-            Feed::None => Ok(Vec::new()),
+            Feed::None | Feed::Remote(_) => Ok(Vec::new()),
             Feed::Live(live) => live.wait_until(time_s, progress),
             Feed::Recorded(player) => Ok(player.frames_to(time_s)),
         }
@@ -165,6 +180,7 @@ impl Feed {
             Feed::None => {}
             Feed::Live(live) => live.join(),
             Feed::Recorded(player) => player.replay = Replay::new(0),
+            Feed::Remote(remote) => remote.forget_light(),
         }
     }
 
@@ -197,6 +213,12 @@ impl Feed {
             Feed::Live(live) => {
                 format!("server here: {:.0} ms, {} traced", 1e3 * live.step_seconds, live.traced)
             }
+            Feed::Remote(remote) => match remote.state() {
+                LinkState::Connected => "live".to_owned(),
+                LinkState::Connecting => "connecting".to_owned(),
+                LinkState::Waiting(_, seconds) => format!("broken, again in {seconds:.1} s"),
+                LinkState::Ended(_) => "ended".to_owned(),
+            },
             Feed::Recorded(player) => match player.recording.header() {
                 Some(header) if !header.name.is_empty() => format!("recording \"{}\"", header.name),
                 _ => "recording".to_owned(),

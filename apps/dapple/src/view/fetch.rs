@@ -5,10 +5,10 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
-use dapple_scene::{NoFiles, Scene};
+use dapple_scene::{NoFiles, Scene, Spare};
 
 use crate::inspect::MAX_RECORDING_BYTES;
-use crate::page::{FILE_NAME, ViewerJson, resolve};
+use crate::page::{FILE_NAME, Spares, ViewerJson, resolve};
 use crate::progress::Bar;
 use crate::source::MAX_SCENE_BYTES;
 
@@ -26,6 +26,8 @@ pub(super) struct Fetched {
     pub(super) scene: Scene,
     pub(super) title: String,
     pub(super) stream: Option<Receiver<Piece>>,
+    /// Where its live session is, `ws://…`.
+    pub(super) live: Option<String>,
 }
 
 /// The next bytes, or why there are no more; the channel closes after the last.
@@ -41,16 +43,32 @@ pub(super) fn fetch(url: &str) -> Result<Fetched> {
     let bytes = get_all(&scene_address, MAX_SCENE_BYTES)?;
     drop(bar);
     let name = scene_address.rsplit('/').next().unwrap_or_default();
-    let scene = dapple_scene::load(name, &bytes, &NoFiles)
+    let mut scene = dapple_scene::load(name, &bytes, &NoFiles)
         .with_context(|| format!("{scene_address} cannot be shown"))?;
     if scene.triangle_count() == 0 {
         bail!("{scene_address} has no triangles: there is nothing to show");
     }
+    if let Some(animation) = json.animation {
+        if animation as usize >= scene.animations.len() {
+            bail!("{json_address} names animation {animation}, which the scene does not have");
+        }
+        scene.set_active_animation(Some(animation));
+    }
+    let spares: Vec<Spare> = json
+        .spares
+        .iter()
+        .map(|Spares { instance, count }| Spare { instance: *instance, count: *count })
+        .collect();
+    scene.add_spares(&spares).with_context(|| format!("{json_address}: spare instances"))?;
+    let live = match &json.live {
+        Some(live) => Some(resolve(url, live)?.replacen("http://", "ws://", 1)),
+        None => None,
+    };
     let stream = match &json.stream {
         Some(stream) => Some(get_pieces(resolve(url, stream)?)?),
         None => None,
     };
-    Ok(Fetched { scene, title: scene_address, stream })
+    Ok(Fetched { scene, title: scene_address, stream, live })
 }
 
 fn open(address: &str) -> Result<(impl Read + Send + use<>, Option<u64>)> {

@@ -30,6 +30,9 @@ pub(super) fn run(args: &ViewArgs, opening: Opening) -> Result<()> {
     if let Some((duration_s, loaded_s)) = show.feed.extent_s() {
         show.clock.set_extent(duration_s, loaded_s);
     }
+    if show.feed.remote().is_some() {
+        return run_live(args, &gpu, show, &folder);
+    }
     let rest_s = (show.clock.duration_s() - args.time).max(0.0);
     let span_s = args.seconds.unwrap_or(rest_s);
 
@@ -72,6 +75,58 @@ pub(super) fn run(args: &ViewArgs, opening: Opening) -> Result<()> {
         if args.frames > 1 { format!(", {updates} bytes of updates") } else { String::new() },
         1e3 * draw_seconds / f64::from(args.frames),
         gpu.description()
+    );
+    Ok(())
+}
+
+/// Seconds that a live session may take until there is something to show.
+const LIVE_PATIENCE_S: f64 = 60.0;
+
+/// Pictures of a live session, at once and after real seconds.
+fn run_live(args: &ViewArgs, gpu: &Gpu, mut show: Show, folder: &std::path::Path) -> Result<()> {
+    let size = (args.size.width, args.size.height);
+    let span_s = args.seconds.unwrap_or(0.0);
+    let start = Instant::now();
+    let now_s = || start.elapsed().as_secs_f64();
+    let mut first_s = None;
+    for number in 0..args.frames {
+        let wanted_s = span_s * f64::from(number) / f64::from(args.frames);
+        loop {
+            let before = Instant::now();
+            show.advance(now_s(), &|| before.elapsed().as_secs_f64())?;
+            if let Some(reason) = show.ended() {
+                bail!("{reason}");
+            }
+            if show.has_light() {
+                show.finish_work();
+                let first_s = *first_s.get_or_insert_with(now_s);
+                if now_s() - first_s >= wanted_s {
+                    break;
+                }
+            } else if now_s() > LIVE_PATIENCE_S {
+                bail!("no light has come within {LIVE_PATIENCE_S} s: {}", show.feed.label());
+            }
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+        let pixels = picture::take(gpu, &mut show, size, now_s())?;
+        if let Some(fault) = gpu.take_fault() {
+            return Err(fault.into());
+        }
+        write_png(&folder.join(format!("frame-{number:03}.png")), size.0, size.1, &pixels)?;
+    }
+    let figures = show.figures(now_s());
+    let live = show.feed.remote().map(|remote| remote.figures());
+    say!(
+        "wrote {} pictures of {} to {}: {}; {} points, {} bytes, the first light after {:.2} s, visibility {:.0} ms old, {} viewers",
+        args.frames,
+        args.size,
+        folder.display(),
+        show.title,
+        figures.viewer.points,
+        figures.viewer.bytes_received,
+        first_s.unwrap_or_default(),
+        1e3 * live.as_ref().and_then(|live| live.age_s).unwrap_or_default(),
+        live.map_or(0, |live| live.status.viewers),
     );
     Ok(())
 }

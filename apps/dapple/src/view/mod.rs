@@ -9,6 +9,7 @@ mod paint;
 mod picture;
 mod quality;
 mod record_path;
+mod remote;
 mod retries;
 mod screen;
 mod session;
@@ -25,14 +26,22 @@ use dapple_client::viewer::DrawOptions;
 use crate::args::{LightArgs, ViewArgs};
 use crate::source;
 
+use dapple_session::GuestConfig;
 use feed::{Feed, Player};
 use quality::Quality;
+use remote::Remote;
 use session::Outputs;
 use show::{Opening, start_server};
 use steer::Steering;
 
 /// Updates a second where none are given.
 const DEFAULT_HZ: f64 = 15.0;
+
+/// The scene that a folder's viewer.json names, and where its live session is.
+pub(crate) fn fetch_scene(url: &str) -> Result<(dapple_scene::Scene, Option<String>)> {
+    let fetched = fetch::fetch(url)?;
+    Ok((fetched.scene, fetched.live))
+}
 
 /// Shows what the arguments name.
 pub(crate) fn run(args: &ViewArgs) -> Result<()> {
@@ -85,9 +94,16 @@ fn open(args: &ViewArgs) -> Result<Opening> {
         Some(url) => {
             let fetched = fetch::fetch(url)?;
             let scene = Arc::new(fetched.scene);
-            let feed = match fetched.stream {
-                Some(pieces) => Feed::Recorded(Player::incoming(pieces, &scene)),
-                None => Feed::None,
+            let feed = match (fetched.live, fetched.stream) {
+                (Some(address), _) => {
+                    let bits_per_s = args.step.budget.map(|rate| rate.0);
+                    let seed = u64::from(std::process::id());
+                    let config =
+                        GuestConfig { token: args.token.clone(), bits_per_s, seed, ..GuestConfig::default() };
+                    Feed::Remote(Remote::join(address, &scene, config)?)
+                }
+                (None, Some(pieces)) => Feed::Recorded(Player::incoming(pieces, &scene)),
+                (None, None) => Feed::None,
             };
             (scene, fetched.title, feed)
         }

@@ -6,6 +6,8 @@ use egui::{Align2, Color32, Context, RichText, Slider, Ui, vec2};
 use super::quality::{METHODS, PRESETS, Quality, VIEWS, name_of};
 use super::show::{Figures, Show};
 use crate::args::Preset;
+use crate::live::LinkState;
+use dapple_session::Role;
 
 /// Width of the panel, in the overlay's units.
 const PANEL_WIDTH: f32 = 240.0;
@@ -101,16 +103,23 @@ impl Overlay {
         wish
     }
 
-    fn messages(&mut self, ctx: &Context, show: &Show, now_s: f64) {
+    fn messages(&mut self, ctx: &Context, show: &mut Show, now_s: f64) {
         if self.notice.as_ref().is_some_and(|(_, until_s)| now_s > *until_s) {
             self.notice = None;
         }
         let preparing = show.feed.preparing();
         // What stays as it is until something else is shown.
-        let lasting = [self.failure.as_deref(), show.problem()];
+        let broken = match show.feed.remote().map(|remote| remote.state()) {
+            Some(LinkState::Waiting(reason, seconds)) => {
+                Some(format!("{reason}; trying again in {seconds:.1} s"))
+            }
+            Some(LinkState::Ended(reason)) => Some(reason),
+            _ => None,
+        };
+        let lasting = [self.failure.as_deref(), show.problem(), broken.as_deref()];
         let recording =
             self.recorded_s.map(|seconds| format!("recording the camera: {seconds:.1} s; R stops"));
-        if self.notice.is_none() && preparing.is_none() && recording.is_none() && lasting == [None; 2] {
+        if self.notice.is_none() && preparing.is_none() && recording.is_none() && lasting == [None; 3] {
             return;
         }
         egui::Area::new(egui::Id::unique("messages"))
@@ -136,7 +145,7 @@ impl Overlay {
     }
 }
 
-fn figures_grid(ui: &mut Ui, show: &Show, figures: &Figures) {
+fn figures_grid(ui: &mut Ui, show: &mut Show, figures: &Figures) {
     let viewer = &figures.viewer;
     let age = figures.age_s.map_or("–".to_owned(), |age_s| format!("{age_s:.1} s"));
     let texels = match figures.progress {
@@ -158,6 +167,7 @@ fn figures_grid(ui: &mut Ui, show: &Show, figures: &Figures) {
         ("light", show.feed.label()),
         ("camera", show.steering.label().to_owned()),
     ];
+    let rows = rows.into_iter().chain(live_rows(show));
     egui::Grid::new("figures").num_columns(2).spacing([12.0, 2.0]).show(ui, |ui| {
         for (name, value) in rows {
             ui.weak(name);
@@ -165,6 +175,27 @@ fn figures_grid(ui: &mut Ui, show: &Show, figures: &Figures) {
             ui.end_row();
         }
     });
+}
+
+/// What there is to say of a live session: where the time goes from the host's step to here.
+fn live_rows(show: &mut Show) -> Vec<(&'static str, String)> {
+    let Some(remote) = show.feed.remote() else { return Vec::new() };
+    let figures = remote.figures();
+    let ms = |seconds: f64| format!("{:.1} ms", 1e3 * seconds);
+    let latency = figures.latency;
+    let role = match figures.role {
+        Some(Role::Interact) => "may change things",
+        Some(Role::View) => "looks",
+        None => "–",
+    };
+    vec![
+        ("viewers", format!("{}, this one {role}", figures.status.viewers)),
+        ("visibility is", figures.age_s.map_or("–".to_owned(), |age_s| format!("{} old", ms(age_s)))),
+        ("  step", ms(latency.step_s)),
+        ("  queue", ms(latency.queue_s)),
+        ("  network", ms(latency.network_s)),
+        ("  apply", ms(latency.apply_s)),
+    ]
 }
 
 fn choices(ui: &mut Ui, show: &mut Show) -> Option<Wish> {
@@ -220,14 +251,14 @@ fn time_bar(ui: &mut Ui, show: &mut Show) {
         ui.horizontal(|ui| {
             let playing = show.clock.is_playing();
             if ui.button(if playing { "Pause" } else { "Play" }).clicked() {
-                show.clock.set_playing(!playing);
+                show.set_playing(!playing);
             }
             let duration_s = show.clock.duration_s().max(0.001);
             let mut time_s = show.clock.time_s();
             ui.spacing_mut().slider_width = (ui.available_width() - 90.0).max(60.0);
             let slider = Slider::new(&mut time_s, 0.0..=duration_s).suffix(" s").fixed_decimals(2);
             if ui.add(slider).changed() {
-                show.clock.seek(time_s);
+                show.seek(time_s);
             }
         });
     });

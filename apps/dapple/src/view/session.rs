@@ -129,6 +129,10 @@ impl Session {
                 self.linger(now_s);
             }
         }
+        if let Some(reason) = self.show.take_rejected() {
+            self.overlay.tell(reason, now_s);
+            self.linger(now_s);
+        }
         self.record(now_s);
         let stale = now_s > self.drawn_s + self.overlay.stale_after_s() && !self.overlay.hidden;
         now_s < self.draw_until_s
@@ -280,13 +284,13 @@ impl Session {
             KeyCode::KeyH | KeyCode::F1 => self.overlay.help = !self.overlay.help,
             KeyCode::Escape => self.overlay.help = false,
             KeyCode::KeyU => self.overlay.hidden = !self.overlay.hidden,
-            KeyCode::Space => show.clock.set_playing(!show.clock.is_playing()),
+            KeyCode::Space => show.set_playing(!show.clock.is_playing()),
             KeyCode::ArrowLeft | KeyCode::ArrowRight => {
                 let step_s = if code == KeyCode::ArrowLeft { -STEP_S } else { STEP_S };
-                show.clock.set_playing(false);
-                show.clock.seek((time_s + step_s).max(0.0));
+                show.set_playing(false);
+                show.seek((time_s + step_s).max(0.0));
             }
-            KeyCode::Home => show.clock.seek(0.0),
+            KeyCode::Home => show.seek(0.0),
             KeyCode::KeyO => show.steering.toggle_walking(&scene, time_s),
             KeyCode::KeyC => show.steering.next_path(),
             KeyCode::KeyF => {

@@ -1,6 +1,7 @@
 //! What is shown, without the window: scene, light, clock, camera, choices and figures.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use anyhow::Result;
 use dapple_client::clock::Clock;
@@ -10,6 +11,7 @@ use dapple_gpu::{Gpu, wgpu};
 use dapple_render::shade::ShadeParams;
 use dapple_scene::{KeyedPath, Scene};
 use dapple_server::ServerConfig;
+use dapple_session::{Event, Held};
 use dapple_stream::PublisherConfig;
 
 use super::feed::{Feed, group_of};
@@ -19,6 +21,7 @@ use super::record_path::PathRecorder;
 use super::steer::Steering;
 use crate::args::LightArgs;
 use crate::light::{scene_seconds, server_config};
+use crate::live::LinkState;
 
 /// Texels that are worked on at a time: some milliseconds.
 const WORK_TEXELS: usize = 512;
@@ -45,6 +48,10 @@ pub(super) struct Show {
     points: Rate,
     pictures: Rate,
     last_s: Option<f64>,
+    /// Of the last picture.
+    aspect: f32,
+    /// What a host said no to.
+    rejected: Option<String>,
     /// The problem of the viewer that was logged last.
     logged: Option<String>,
 }
@@ -93,6 +100,8 @@ impl Show {
             points: Rate::default(),
             pictures: Rate::default(),
             last_s: None,
+            aspect: 16.0 / 9.0,
+            rejected: None,
             logged: None,
         })
     }
@@ -136,7 +145,9 @@ impl Show {
     }
 
     fn take_viewer(&mut self, viewer: Viewer) {
+        let edits = self.viewer.edits().clone();
         self.viewer = viewer;
+        self.viewer.set_edits(&edits);
         self.progress = LoadProgress::default();
         self.feed.join();
     }
@@ -148,6 +159,7 @@ impl Show {
         self.last_s = Some(now_s);
         let mut changed = self.clock.advance(elapsed_s);
         self.look();
+        changed |= self.receive_live(now_s)?;
         let frames = self.feed.poll(self.clock.time_s())?;
         if let Some((duration_s, loaded_s)) = self.feed.extent_s() {
             self.clock.set_extent(duration_s, loaded_s);
@@ -172,7 +184,70 @@ impl Show {
     /// Tells the server how the viewer looks.
     pub(super) fn look(&mut self) {
         let camera = self.steering.camera(&self.scene, self.clock.time_s());
-        self.feed.look(&camera);
+        self.feed.look(&camera, self.aspect);
+    }
+
+    /// Takes what a live session brought; true if there is something new to draw.
+    fn receive_live(&mut self, now_s: f64) -> Result<bool> {
+        let Some(remote) = self.feed.remote() else { return Ok(false) };
+        let mut changed = false;
+        if let Some(edits) = remote.new_edits() {
+            self.viewer.set_edits(&edits);
+            changed = true;
+        }
+        let (time_s, playing) = remote.scene_time();
+        let duration_s = self.clock.duration_s();
+        let time_s = if duration_s > 0.0 { time_s.rem_euclid(duration_s) } else { time_s };
+        changed |= time_s != self.clock.time_s();
+        self.clock.set_playing(playing);
+        self.clock.seek(time_s);
+        self.rejected = remote.rejected().or(self.rejected.take());
+        for frame in remote.take_frames() {
+            let start = Instant::now();
+            let applied = self.viewer.receive(&frame, now_s);
+            let held = self.viewer.held().map(|(group, epoch)| Held { group, epoch });
+            remote.applied(held, applied.is_ok(), start.elapsed().as_secs_f64());
+            match applied {
+                Ok(applied) => {
+                    changed = true;
+                    self.bytes.add(now_s, frame.len() as f64);
+                    self.points.add(now_s, f64::from(self.viewer.changed_by(&applied)));
+                }
+                // The host hears of it, and sends what helps.
+                Err(error) if error.snapshot_helps() => tracing::debug!("{error}"),
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Ok(changed)
+    }
+
+    /// What a host has said no to since this was last asked.
+    pub(super) fn take_rejected(&mut self) -> Option<String> {
+        self.rejected.take()
+    }
+
+    /// Lets time go on or wait: for everyone, in a live session.
+    pub(super) fn set_playing(&mut self, playing: bool) {
+        let event = if playing { Event::Play } else { Event::Pause };
+        if !self.tell_host(event) {
+            self.clock.set_playing(playing);
+        }
+    }
+
+    /// Goes to a time: everyone, in a live session.
+    pub(super) fn seek(&mut self, time_s: f64) {
+        if !self.tell_host(Event::Seek { time_s: time_s.max(0.0) }) {
+            self.clock.seek(time_s);
+        }
+    }
+
+    /// Tells the host of a live session; false if there is none.
+    fn tell_host(&mut self, event: Event) -> bool {
+        let Some(remote) = self.feed.remote() else { return false };
+        if let Err(reason) = remote.send(event) {
+            self.rejected = Some(reason.to_owned());
+        }
+        true
     }
 
     /// Hands a frame to the viewer.
@@ -184,6 +259,19 @@ impl Show {
         self.bytes.add(now_s, frame.len() as f64);
         self.points.add(now_s, f64::from(self.viewer.changed_by(&applied)));
         Ok(())
+    }
+
+    /// Whether there is any light to show.
+    pub(super) fn has_light(&self) -> bool {
+        self.viewer.store().is_some()
+    }
+
+    /// Why a live session has ended for good, if it has.
+    pub(super) fn ended(&mut self) -> Option<String> {
+        match self.feed.remote()?.state() {
+            LinkState::Ended(reason) => Some(reason),
+            _ => None,
+        }
     }
 
     /// Does all work that is left after a snapshot.
@@ -205,6 +293,7 @@ impl Show {
         now_s: f64,
     ) -> Result<()> {
         let time_s = self.clock.time_s();
+        self.aspect = size.0 as f32 / size.1.max(1) as f32;
         let camera = self.steering.camera(&self.scene, time_s);
         self.viewer.draw(gpu, target, size, &camera, time_s, now_s, &self.options)?;
         let problem = self.viewer.problem();

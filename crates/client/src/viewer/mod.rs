@@ -274,7 +274,7 @@ impl Viewer {
         self.light.subscriber.store()
     }
 
-    /// Group and epoch of what this viewer holds.
+    /// Group and epoch of what it holds; nothing before the first snapshot.
     pub fn held(&self) -> Option<(u64, u64)> {
         self.light.subscriber.group().zip(self.light.subscriber.epoch())
     }

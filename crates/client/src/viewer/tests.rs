@@ -1,5 +1,7 @@
 //! The viewer against the client on the processor, and what it promises about work, fades and wrong frames.
 
+mod edits;
+
 use std::sync::Arc;
 
 use dapple_gpu::testing::{block_on, gpu_for_tests};

@@ -73,6 +73,10 @@ fn lights_fade_as_the_extension_says() {
     assert_eq!(at(&light(LightKind::Point, Some(2.0)), 0.0), 0.0);
     assert_eq!(at(&light(LightKind::Point, Some(1.0)), 0.0), 0.0);
     assert_eq!(at(&light(SUN, None), 5.0), 8.0);
+    // What counts is what the pose says, not the scene.
+    let edited = PosedLight { color: Vec3::new(0.5, 0.0, 1.0), intensity: 2.0, ..posed.clone() };
+    let irradiance = light_irradiance(&light(SUN, None), &edited, Vec3::ZERO, Vec3::Y);
+    assert_eq!(irradiance, Vec3::new(1.0, 0.0, 2.0));
     let spot = light(LightKind::Spot { inner_cone_angle: 0.2, outer_cone_angle: 0.6 }, None);
     let point = light(LightKind::Point, None);
     assert_eq!(at(&spot, 2.0 * 0.19f32.tan()), at(&point, 2.0 * 0.19f32.tan()));

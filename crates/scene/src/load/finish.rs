@@ -7,7 +7,7 @@ use glam::{Mat3, Vec3};
 
 use super::context::{Context, is_usable};
 use super::{LoadError, normals};
-use crate::{Instance, Mesh, Pose, Scene};
+use crate::{Aabb, Instance, Mesh, Pose, Scene};
 
 /// A scene under construction: node indices are those of the file, in any order.
 #[derive(Default)]
@@ -132,7 +132,12 @@ fn set_rest_scale<'l>(
     }
     let pose = scene.pose(0.0);
     for (i, instance) in scene.instances.iter().enumerate() {
-        let bounds = scene.instance_bounds_world(&pose, i);
+        // What has no size at first still has a place.
+        let posed = &pose.instances[i];
+        let bounds = match posed.is_there() {
+            true => scene.instance_bounds_world(&pose, i),
+            false => Aabb::from_points([posed.world_from_mesh.translation.into()]),
+        };
         let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
         if !is_usable(largest) {
             return Err(context.not_finite(format!("the place in the world of {}", label_of(instance.node))));

@@ -12,15 +12,18 @@ pub use timing::Latency;
 
 use crate::light::{Assembled, Assembly};
 use crate::{
-    Event, FromHost, FromViewer, Held, Hello, LightHead, Look, LookCamera, MessageError, PROTOCOL, Refusal, Role,
-    SceneClock, Status, Welcome,
+    Event, FromHost, FromViewer, Held, Hello, LightHead, Look, LookCamera, MessageError, PROTOCOL, Refusal,
+    Role, SceneClock, Status, Welcome,
 };
 use backoff::Backoff;
 use pending::Pending;
 use timing::Timing;
 
-/// Shortest time between two looks while light comes or the camera moves, microseconds.
+/// Shortest time between two looks, microseconds.
 const LOOK_EVERY_US: u64 = 100_000;
+
+/// Shortest time between two looks that only say what has come: half of what a host waits for before it holds light back.
+const RECEIPT_EVERY_US: u64 = 250_000;
 
 /// Longest time between two looks: the host lets go whom it does not hear.
 const ALIVE_EVERY_US: u64 = 1_000_000;
@@ -87,6 +90,7 @@ pub struct Guest {
     timing: Timing,
     backoff: Backoff,
     status: Status,
+    newest: Option<LightHead>,
     look: Look,
     /// What was said in the last look, and when.
     said: Look,
@@ -112,6 +116,7 @@ impl Guest {
             timing: Timing::default(),
             backoff: Backoff::new(config.seed),
             status: Status::default(),
+            newest: None,
             look: Look::default(),
             said: Look::default(),
             said_us: 0,
@@ -126,7 +131,7 @@ impl Guest {
         (self.look.came, self.look.lost, self.said_us) = (0, 0, now_us);
         // Versions count anew with another host; what was changed stays until the state comes.
         self.version = 0;
-        self.assembly = Assembly::default();
+        (self.assembly, self.newest) = (Assembly::default(), None);
         self.timing.connected();
         self.pending.connected();
     }
@@ -206,12 +211,13 @@ impl Guest {
         };
         Ok(match self.assembly.push(head, piece, most) {
             Assembled::Part => News::Nothing,
-            Assembled::Gap => {
+            Assembled::Never => {
                 self.look.lost += 1;
                 News::Nothing
             }
             Assembled::Whole(head, frame) => {
                 self.timing.light(&head, now_us);
+                self.newest = Some(head);
                 if head.stamp_us >= self.look.heard_us {
                     (self.look.heard_us, self.heard_at_us) = (head.stamp_us, now_us);
                 }
@@ -275,12 +281,13 @@ impl Guest {
     fn next_look(&mut self, now_us: u64) -> Option<String> {
         let since_us = now_us.saturating_sub(self.said_us);
         let is_news = self.look.camera != self.said.camera
-            || self.look.came != self.said.came
             || self.look.lost != self.said.lost
-            || self.held != self.said.held
             || self.version != self.said.state;
-        let is_first = self.said.number == 0;
-        if !(is_first || is_news && since_us >= LOOK_EVERY_US || since_us >= ALIVE_EVERY_US) {
+        let has_come = self.look.came != self.said.came || self.held != self.said.held;
+        let is_due = is_news && since_us >= LOOK_EVERY_US
+            || has_come && since_us >= RECEIPT_EVERY_US
+            || since_us >= ALIVE_EVERY_US;
+        if self.said.number > 0 && !is_due {
             return None;
         }
         self.look.number += 1;
@@ -326,6 +333,11 @@ impl Guest {
     /// Where the time goes between the host's step and this viewer.
     pub fn latency(&self) -> Latency {
         self.timing.latency(&self.status)
+    }
+
+    /// The head of the light that came last; `None` before any came over this connection.
+    pub fn newest(&self) -> Option<&LightHead> {
+        self.newest.as_ref()
     }
 
     /// How the host was when it last said so.

@@ -125,7 +125,10 @@ mod tests {
         let age_us = timing.age_us(now_us).unwrap();
         assert!(age_us.abs_diff(40_000) < 5_000, "{age_us}");
         let latency = timing.latency(&Status::default());
-        assert!((latency.step_s - 0.01).abs() < 1e-3 && (0.03..0.045).contains(&latency.network_s), "{latency:?}");
+        assert!(
+            (latency.step_s - 0.01).abs() < 1e-3 && (0.03..0.045).contains(&latency.network_s),
+            "{latency:?}"
+        );
     }
 
     #[test]

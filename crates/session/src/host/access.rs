@@ -31,13 +31,20 @@ impl Access {
         self.tokens.iter().all(|(_, role)| *role != Role::View).then_some(Role::View)
     }
 
+    /// Whether this is one of the tokens.
+    pub fn knows(&self, token: Option<&str>) -> bool {
+        token.is_some_and(|token| self.tokens.iter().any(|(known, _)| equal(known, token)))
+    }
+
     pub(super) fn role(&self, token: Option<&str>) -> Result<Role, Refusal> {
         let refusal = |message: &str| Refusal::new(Reason::Token, message);
         if self.tokens.is_empty() {
             return Ok(Role::Interact);
         }
         let Some(token) = token else {
-            return self.open_role().ok_or_else(|| refusal("this host asks for a token: add ?token=… to its address"));
+            return self
+                .open_role()
+                .ok_or_else(|| refusal("this host asks for a token: add ?token=… to its address"));
         };
         let roles = self.tokens.iter().filter(|(known, _)| equal(known, token)).map(|(_, role)| *role);
         roles.max().ok_or_else(|| refusal("the token is not one of this host's"))
@@ -55,7 +62,8 @@ mod tests {
 
     #[test]
     fn tokens_give_roles() {
-        let role = |access: &Access, token: Option<&str>| access.role(token).map_err(|refusal| refusal.reason);
+        let role =
+            |access: &Access, token: Option<&str>| access.role(token).map_err(|refusal| refusal.reason);
         let open = Access::default();
         assert_eq!(role(&open, None), Ok(Role::Interact));
         assert_eq!(role(&open, Some("anything")), Ok(Role::Interact));

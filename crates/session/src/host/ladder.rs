@@ -10,6 +10,9 @@ use crate::{Held, LightHead};
 /// Frames are kept for viewers that are behind until they are longer together than a snapshot, but so many bytes at least.
 const MIN_KEPT_BYTES: usize = 256 << 10;
 
+/// Nobody jumps who is behind by less.
+const MIN_JUMP_BYTES: usize = 16 << 10;
+
 /// Most frames that are kept.
 const MAX_KEPT_FRAMES: usize = 2048;
 
@@ -90,8 +93,9 @@ impl Rung {
         self.is_wanted = false;
     }
 
-    /// What brings on a viewer that holds this.
-    pub(super) fn step(&mut self, held: Option<Held>) -> Step {
+    /// What brings on a viewer that holds this. Where messages overtake each other (`in_order` false) a snapshot must be the newest, so that nothing
+    /// has to follow it.
+    pub(super) fn step(&mut self, held: Option<Held>, in_order: bool) -> Step {
         let Some(now) = self.now else {
             self.is_wanted = true;
             return Step::Wait;
@@ -102,7 +106,7 @@ impl Rung {
         if let Some(held) = held.filter(|held| held.group == now.group)
             && let Some(at) = self.position(held.epoch)
             // Behind by more than a snapshot is long: it jumps.
-            && self.bytes_from(at) <= self.snapshot_bytes.max(MIN_KEPT_BYTES)
+            && self.bytes_from(at) <= self.jump_bytes()
         {
             return Step::Delta(self.kept[at].clone());
         }
@@ -110,9 +114,10 @@ impl Rung {
         let usable = self.snapshot.clone().filter(|snapshot| {
             snapshot.held.group == now.group
                 && (snapshot.held == now
-                    || self.position(snapshot.held.epoch).is_some_and(|at| {
-                        self.bytes_from(at) <= snapshot.bytes / 4 + 4096
-                    }))
+                    || in_order
+                        && self
+                            .position(snapshot.held.epoch)
+                            .is_some_and(|at| self.bytes_from(at) <= snapshot.bytes / 4 + 4096))
         });
         match usable {
             Some(snapshot) => Step::Snapshot(snapshot),
@@ -121,6 +126,12 @@ impl Rung {
                 Step::Wait
             }
         }
+    }
+
+    /// Who is behind by more gets a snapshot instead.
+    fn jump_bytes(&self) -> usize {
+        // Before one was made its length is not known.
+        if self.snapshot_bytes == 0 { MIN_KEPT_BYTES } else { self.snapshot_bytes.max(MIN_JUMP_BYTES) }
     }
 
     fn position(&self, epoch: u64) -> Option<usize> {

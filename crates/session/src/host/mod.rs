@@ -317,8 +317,8 @@ impl Host {
             return Err(Refusal::new(Reason::TooMany, message));
         }
         viewer.last_message_us = now_us;
-        let message = FromViewer::parse(text)
-            .map_err(|error| Refusal::new(Reason::Malformed, error.to_string()))?;
+        let message =
+            FromViewer::parse(text).map_err(|error| Refusal::new(Reason::Malformed, error.to_string()))?;
         match message {
             FromViewer::Hello(_) => {
                 Err(Refusal::new(Reason::Malformed, "a second hello over the same connection"))
@@ -334,7 +334,7 @@ impl Host {
             FromViewer::Event { number, event } => {
                 // What was heard before needs no answer but that; what does not follow comes again.
                 if number != viewer.events_taken.wrapping_add(1) {
-                    viewer.answer_events();
+                    viewer.answer_events_again();
                     return Ok(());
                 }
                 let refused = if viewer.role < Role::Interact {

@@ -101,7 +101,10 @@ impl Batch<'_> {
             Event::Pause => self.clock = self.clock.with_playing(false, self.now_us),
             Event::Seek { time_s } => {
                 if !(0.0..=SceneClock::MAX_TIME_S).contains(&time_s) {
-                    return Err(format!("a time of {time_s} s is not within 0 to {}", SceneClock::MAX_TIME_S));
+                    return Err(format!(
+                        "a time of {time_s} s is not within 0 to {}",
+                        SceneClock::MAX_TIME_S
+                    ));
                 }
                 self.clock = self.clock.with_time((time_s * 1e6).round() as u64, self.now_us);
             }

@@ -20,6 +20,9 @@ const STATUS_EVERY_US: u64 = 1_000_000;
 /// After so long without progress light counts as lost where links may lose it, microseconds.
 const LOST_AFTER_US: u64 = 1_000_000;
 
+/// More than that light is still right says so: so many bytes from one look to the next are progress.
+const PROGRESS_BYTES: u64 = 1024;
+
 /// Shortest time between two repairs, microseconds: what was on its way before the first must not cause the second.
 const REPAIR_EVERY_US: u64 = 250_000;
 
@@ -63,8 +66,9 @@ struct Sent {
     came: u64,
     /// Bytes given out up to a message, and when that was.
     on_its_way: VecDeque<(u64, u64)>,
-    /// When light, or that there is none, was last given out.
+    /// When light, or that there is none, was last given out, and when light was.
     last_us: u64,
+    frame_us: u64,
     /// Breaks that the viewer told of and that were mended, when one was mended last, and when more last came.
     lost: u32,
     repaired_us: u64,
@@ -112,8 +116,7 @@ impl Viewer {
         self.control.clear();
         // What was taken and not dealt with yet still will be.
         self.events_told = self.events_done;
-        self.light =
-            Sent { held, is_reliable, last_us: now_us, progress_us: now_us, ..Sent::default() };
+        self.light = Sent { held, is_reliable, last_us: now_us, progress_us: now_us, ..Sent::default() };
     }
 
     /// Queues a text.
@@ -133,6 +136,14 @@ impl Viewer {
     pub(super) fn answer_events(&mut self) {
         if self.events_told != self.events_done {
             self.events_told = self.events_done;
+            self.tell(&FromHost::Heard { number: self.events_done });
+        }
+    }
+
+    /// Tells it whether it is news or not: the answer may have been lost.
+    pub(super) fn answer_events_again(&mut self) {
+        self.events_told = self.events_done;
+        if self.events_done > 0 {
             self.tell(&FromHost::Heard { number: self.events_done });
         }
     }
@@ -188,13 +199,14 @@ impl Viewer {
             if *next == entry.messages.len() {
                 light.sending = None;
             }
+            light.frame_us = now_us;
             light.give(&message, now_us);
             return Some(message);
         }
         if light.is_congested(config.window_us, now_us) {
             return None;
         }
-        let entry = match rung.step(light.held) {
+        let entry = match rung.step(light.held, light.is_reliable) {
             Step::UpToDate => {
                 if now_us.saturating_sub(light.last_us) < TICK_EVERY_US {
                     return None;
@@ -214,7 +226,7 @@ impl Viewer {
                 entry
             }
         };
-        light.held = Some(entry.held);
+        (light.held, light.frame_us) = (Some(entry.held), now_us);
         self.queue_us = now_us.saturating_sub(entry.made_us);
         let message = entry.messages[0].clone();
         if entry.messages.len() > 1 {
@@ -241,19 +253,20 @@ impl Sent {
 
     /// What a look says of the light that came.
     fn heard(&mut self, look: &Look, now_us: u64) {
-        if look.came > self.came {
+        if look.came >= self.came + PROGRESS_BYTES {
             self.progress_us = now_us;
         }
         self.came = self.came.max(look.came);
         while self.on_its_way.front().is_some_and(|(given, _)| *given <= self.came) {
             self.on_its_way.pop_front();
         }
-        let stale_us = now_us.saturating_sub(self.last_us.max(self.progress_us));
+        let stale_us = now_us.saturating_sub(self.frame_us.max(self.progress_us));
         let is_silent = !self.is_reliable && look.held != self.held && stale_us > LOST_AFTER_US;
         let has_broken = look.lost > self.lost || is_silent;
         if has_broken && now_us.saturating_sub(self.repaired_us) >= REPAIR_EVERY_US {
             (self.lost, self.repaired_us) = (look.lost, now_us);
-            self.held = look.held;
+            // Where messages overtake each other one is surer to come whole than many in their order.
+            self.held = look.held.filter(|_| self.is_reliable);
             self.sending = None;
         }
     }

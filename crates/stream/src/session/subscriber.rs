@@ -137,6 +137,11 @@ impl Subscriber {
         }
     }
 
+    /// Lets go of what is held: the next frame must be a snapshot.
+    pub fn forget(&mut self) {
+        self.state = None;
+    }
+
     /// What is held, if anything yet.
     pub fn store(&self) -> Option<&PointStore> {
         self.state.as_ref().map(|state| &state.store)

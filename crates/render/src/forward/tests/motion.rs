@@ -6,8 +6,8 @@ use std::sync::Arc;
 use dapple_gpu::testing::block_on;
 use dapple_gpu::{join, read_texture, shader_module, wgpu};
 use dapple_scene::{
-    Animation, Channel, ChannelTarget, Files, Instance, Interpolation, LocalTransform, Mesh, MorphTarget,
-    NoFiles, Node, Part, PosedCamera, Scene, Skin, SkinInfluences,
+    Animation, Channel, ChannelTarget, Edit, Edits, Files, Instance, Interpolation, LocalTransform, Mesh,
+    MorphTarget, NoFiles, Node, Part, Placement, PosedCamera, Scene, Skin, SkinInfluences,
 };
 use glam::{Affine3A, Mat3, Quat, Vec3};
 
@@ -242,6 +242,39 @@ fn deformed_scenes_look_as_the_twin_draws_them() {
         let loose = bench.beauty(SIZE, &scene.pose_undeformed(time), &camera, &params);
         let close = super::harness::compare(&loose, &expected, &gbuffer);
         assert!(close.within > 0.97, "{close:?}");
+    }
+}
+
+#[test]
+fn edited_scenes_look_as_the_twin_draws_them() {
+    let scene = bent_and_swollen();
+    let Some(mut bench) = Bench::new(&scene, 1, &[]) else { return };
+    let camera = PosedCamera::look_at(Vec3::new(1.5, 3.0, 5.5), Vec3::new(0.0, 0.9, 0.0), 0.8);
+    let params = ShadeParams { shadow_resolution: 512, ..ShadeParams::default() };
+    let placement = Placement {
+        translation: [0.3, 0.8, 0.2],
+        rotation: Quat::from_rotation_z(0.7).into(),
+        scale: [1.0, 1.2, 1.0],
+    };
+    for (name, edit, gone) in [
+        ("edited-joint", Edit::Place { node: 2, placement }, None),
+        ("edited-skinned", Edit::Remove { instance: 0 }, Some(0)),
+        ("edited-morphed", Edit::Remove { instance: 1 }, Some(1)),
+    ] {
+        let mut edits = Edits::new(&scene);
+        edits.apply(&scene, &edit).unwrap();
+        let pose = scene.pose_edited(0.6, &edits);
+        let card = bench.beauty(SIZE, &pose, &camera, &params);
+        let (expected, gbuffer) = twin(&scene, &pose, &camera, SIZE, &params);
+        assert_agrees(name, &card, &expected, &gbuffer);
+        let sees = |instance| gbuffer.samples().iter().any(|sample| sample.instance == instance);
+        assert!((0..3).all(|instance| sees(instance) != (gone == Some(instance))), "{name}");
+        let unshadowed = ShadeParams { max_shadowed_lights: 0, ..params };
+        let full = bench.beauty(SIZE, &pose, &camera, &unshadowed);
+        assert_eq!(
+            full,
+            bench.beauty(SIZE, &scene.pose_undeformed_edited(0.6, &edits), &camera, &unshadowed)
+        );
     }
 }
 

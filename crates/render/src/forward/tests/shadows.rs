@@ -1,6 +1,6 @@
 //! Which faces of the shadow maps are drawn again, and that the picture is always the one of maps drawn afresh.
 
-use dapple_scene::{LightKind, NoFiles, Pose, PosedCamera};
+use dapple_scene::{LightKind, NoFiles, Pose, PosedCamera, PosedInstance};
 use glam::{Affine3A, Vec3};
 
 use super::super::Forward;
@@ -82,6 +82,28 @@ fn only_faces_that_see_what_moved_are_drawn_again() {
     let moved = bench.beauty(SIZE, &stage.pose, &camera, &params);
     assert_eq!(bench.drawn.shadow_faces, 0);
     assert_eq!(moved, afresh(&mut bench, &stage.pose, &camera, &params));
+}
+
+#[test]
+fn what_is_removed_leaves_neither_picture_nor_shadow() {
+    let mut stage = two_rooms();
+    let Some(mut bench) = Bench::new(&stage.scene, 1, &[]) else { return };
+    let camera = PosedCamera::look_at(ABOVE, Vec3::ZERO, 1.0);
+    let params = params();
+    let first = bench.beauty(SIZE, &stage.pose, &camera, &params);
+    let home = std::mem::replace(&mut stage.pose.instances[1], PosedInstance::REMOVED);
+    let gone = bench.beauty(SIZE, &stage.pose, &camera, &params);
+    assert!((1..=5).contains(&bench.drawn.shadow_faces), "{:?}", bench.drawn);
+    let (expected, gbuffer) = twin(&stage.scene, &stage.pose, &camera, SIZE, &params);
+    assert!(gbuffer.samples().iter().all(|sample| sample.instance != 1));
+    assert_agrees("removed", &gone, &expected, &gbuffer);
+    assert_eq!(gone, afresh(&mut bench, &stage.pose, &camera, &params));
+    stage.pose.instances[1] = home;
+    assert_eq!(first, bench.beauty(SIZE, &stage.pose, &camera, &params));
+    // Nothing at all is a picture too.
+    stage.pose.instances.fill(PosedInstance::REMOVED);
+    let nothing = bench.beauty(SIZE, &stage.pose, &camera, &params);
+    assert!(nothing.pixels.iter().all(|pixel| *pixel == nothing.pixels[0]));
 }
 
 #[test]

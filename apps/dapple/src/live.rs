@@ -1,0 +1,162 @@
+//! A viewer's end over a network: connects, talks, and connects again.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use dapple_session::{Guest, GuestError, News};
+use tokio::sync::watch;
+
+use crate::transport::{Inbound, Message, Outbound, ws};
+
+/// What waits to be said is looked for this often, besides after each message.
+const LOOK_FOR_WORDS: Duration = Duration::from_millis(50);
+
+/// Nothing from a host for so long means that the connection is dead: it says at least four times a second that the light is right.
+const SILENCE: Duration = Duration::from_secs(10);
+
+/// Largest message that is taken: the state of a scene in which everything was changed.
+const MAX_MESSAGE_BYTES: usize = dapple_session::MAX_FROM_HOST_BYTES;
+
+/// How a connection is.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum LinkState {
+    Connecting,
+    Connected,
+    /// It broke, why, and seconds after which it is tried again.
+    Waiting(String, f64),
+    /// It is of no use to try again, and why.
+    Ended(String),
+}
+
+/// A guest that a task and others share.
+pub(crate) struct SharedGuest {
+    guest: Mutex<Guest>,
+    began: std::time::Instant,
+}
+
+impl SharedGuest {
+    pub(crate) fn new(guest: Guest) -> SharedGuest {
+        SharedGuest { guest: Mutex::new(guest), began: std::time::Instant::now() }
+    }
+
+    pub(crate) fn lock(&self) -> MutexGuard<'_, Guest> {
+        self.guest.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Microseconds of this viewer's clock.
+    pub(crate) fn now_us(&self) -> u64 {
+        self.began.elapsed().as_micros() as u64
+    }
+}
+
+/// Keeps up a session at `ws://…` until told to stop or refused for good. `on_news` is called with the guest as it brings news.
+pub(crate) async fn keep(
+    address: &str,
+    shared: &SharedGuest,
+    state: &watch::Sender<LinkState>,
+    mut stop: watch::Receiver<bool>,
+    mut on_news: impl FnMut(&mut Guest, News) + Send,
+) {
+    loop {
+        state.send_replace(LinkState::Connecting);
+        let ended = converse(address, shared, state, &mut stop, &mut on_news).await;
+        let wait_us = shared.lock().disconnected();
+        let reason = match ended {
+            Ended::Broken(reason) => reason,
+            Ended::Refused(reason) => {
+                state.send_replace(LinkState::Ended(reason));
+                return;
+            }
+            Ended::Stopped => return,
+        };
+        let wait = Duration::from_micros(wait_us);
+        tracing::info!("{reason}; trying again in {:.1} s", wait.as_secs_f64());
+        state.send_replace(LinkState::Waiting(reason, wait.as_secs_f64()));
+        tokio::select! {
+            () = tokio::time::sleep(wait) => {}
+            () = told(&mut stop) => return,
+        }
+    }
+}
+
+/// Waits until told to stop, or until nobody can say so any more.
+async fn told(stop: &mut watch::Receiver<bool>) {
+    let _ = stop.wait_for(|stop| *stop).await;
+}
+
+/// How a conversation ended.
+enum Ended {
+    Broken(String),
+    Refused(String),
+    /// This end was told to stop, and has said so.
+    Stopped,
+}
+
+async fn converse(
+    address: &str,
+    shared: &SharedGuest,
+    state: &watch::Sender<LinkState>,
+    stop: &mut watch::Receiver<bool>,
+    on_news: &mut (impl FnMut(&mut Guest, News) + Send),
+) -> Ended {
+    let connected = tokio::select! {
+        connected = ws::connect(address, MAX_MESSAGE_BYTES) => connected,
+        () = told(stop) => return Ended::Stopped,
+    };
+    let (mut out, mut inbound) = match connected {
+        Ok(halves) => halves,
+        Err(error) => return Ended::Broken(error.to_string()),
+    };
+    shared.lock().connected(shared.now_us());
+    let mut words = tokio::time::interval(LOOK_FOR_WORDS);
+    words.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    let mut heard = tokio::time::Instant::now();
+    loop {
+        loop {
+            let text = shared.lock().next(shared.now_us());
+            let Some(text) = text else { break };
+            if let Err(error) = out.send_text(text.into()).await {
+                return Ended::Broken(error.to_string());
+            }
+        }
+        let message = tokio::select! {
+            message = inbound.receive() => message,
+            () = told(stop) => {
+                // It is no loss if the host does not hear it.
+                let _ = out.send_text(Guest::bye().into()).await;
+                out.close().await;
+                return Ended::Stopped;
+            }
+            _ = words.tick() => {
+                if heard.elapsed() > SILENCE {
+                    return Ended::Broken(format!("the host has said nothing for {} s", SILENCE.as_secs()));
+                }
+                continue;
+            }
+        };
+        let message = match message {
+            Ok(Some(message)) => message,
+            Ok(None) => return Ended::Broken("the host closed the connection".to_owned()),
+            Err(error) => return Ended::Broken(error.to_string()),
+        };
+        heard = tokio::time::Instant::now();
+        let mut guest = shared.lock();
+        let news = match &message {
+            Message::Text(text) => guest.receive_text(text),
+            Message::Bytes(bytes) => guest.receive_bytes(bytes, shared.now_us()),
+        };
+        match news {
+            Ok(News::Nothing) => {}
+            Ok(news) => {
+                if matches!(news, News::Welcome(_)) {
+                    state.send_replace(LinkState::Connected);
+                }
+                on_news(&mut guest, news);
+            }
+            Err(GuestError::Refused(refusal)) if refusal.reason.may_retry() => {
+                return Ended::Broken(refusal.message);
+            }
+            Err(error) => return Ended::Refused(error.to_string()),
+        }
+    }
+}
