@@ -12,6 +12,8 @@ import { join } from "node:path";
 import { launch } from "./launch.mjs";
 
 const PATIENCE_MS = 150_000;
+// Time of the scene at which things are moved, seconds: boulders lie in view.
+const TIME = 14.6;
 const COARSE = "shadowResolution=128&samples=1&maxPixelRatio=0.5&fade=0";
 
 const plan = JSON.parse(await readFile(process.argv[2], "utf8"));
@@ -41,13 +43,17 @@ async function run() {
   facts.bits = await looker.evaluate(() => dapple.live.bitsPerSecond);
 
   // What one pauses stands still for all.
-  await mover.evaluate(() => dapple.pause());
-  await until(looker, () => dapple.paused);
+  await mover.evaluate((time) => {
+    dapple.pause();
+    dapple.seek(time);
+  }, TIME);
+  for (const tab of both) await until(tab, (time) => dapple.paused && Math.abs(dapple.time - time) < 1e-3, TIME);
   facts.times = await Promise.all(both.map((tab) => tab.evaluate(() => dapple.time)));
   await looker.waitForTimeout(300);
   facts.timesLater = await Promise.all(both.map((tab) => tab.evaluate(() => dapple.time)));
 
-  // Something that lies in the hall, seen from near by.
+  // Something that lies in the hall, seen from near by. What is picked is what was drawn last.
+  await mover.evaluate(() => dapple.screenshot());
   const boulder = await mover.evaluate(findBoulder);
   facts.boulder = boulder;
   const camera = { eye: boulder.eye, target: boulder.position, yfovDegrees: 50 };
@@ -147,8 +153,9 @@ async function run() {
   await phone.evaluate((time) => {
     dapple.pause();
     dapple.seek(time);
-  }, facts.times[0]);
-  await until(phone, (time) => dapple.paused && Math.abs(dapple.time - time) < 1e-3, facts.times[0]);
+  }, TIME);
+  await until(phone, (time) => dapple.paused && Math.abs(dapple.time - time) < 1e-3, TIME);
+  await phone.evaluate(() => dapple.screenshot());
   await phone.tap("#across");
   await settle(phone);
   const there = await phone.evaluate(whereIs, boulder.instance);
