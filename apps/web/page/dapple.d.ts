@@ -15,7 +15,8 @@ export interface Camera {
 }
 
 export interface Progress {
-  /** `program` (once a page), `scene`, `stream`: bytes fetched. `light`: texels that have their weights. */
+  /** `program` (once a page), `scene`, `stream`: bytes fetched (of a live session, of its first light). `light`: texels
+   * that have their weights. */
   stage: "program" | "scene" | "stream" | "light";
   loaded: number;
   /** null where the server does not say. */
@@ -25,7 +26,7 @@ export interface Progress {
 export interface Stats {
   /** Pictures drawn a second; a still scene is not drawn again. */
   fps: number;
-  /** Of the stream that is replayed, over the last two seconds. */
+  /** Of the stream that is replayed or comes live, over the last two seconds. */
   megabitsPerSecond: number;
   /** Points whose visibility changed, a second. */
   changedPerSecond: number;
@@ -46,12 +47,76 @@ export interface Stats {
   /** Pixels of the canvas. */
   width: number;
   height: number;
-  /** Time of the scene, and where it begins again (0 for never), seconds. */
+  /** Time of the scene, and where it begins again (0 for never), seconds; that of a live session is the host's. */
   time: number;
   duration: number;
   playing: boolean;
   /** Why the chosen method cannot show the points, so that the scene is drawn without occlusion; null where it can. */
   problem: string | null;
+  /** Of a live session; null without one. */
+  live: LiveStatus | null;
+}
+
+/** How a live session stands. */
+export interface LiveStatus {
+  /** `connecting` (for the first time), `live`, `reconnecting` (what came stays in view), `refused` (for good), `closed`. */
+  state: "connecting" | "live" | "reconnecting" | "refused" | "closed";
+  /** Seconds to the next try while `reconnecting`; null while one is under way, and otherwise. */
+  retryIn: number | null;
+  /** Why the server said no: `token`, `scene` (another one than was loaded), `version`, `full`, `closing`, `silent`,
+   * `too-many`, `replaced`, `malformed`; `address` for one that leads nowhere. null where it said nothing. */
+  reason: string | null;
+  /** The same for people. */
+  message: string | null;
+  /** Whether the server has let the viewer in, and whether light ever came. */
+  connected: boolean;
+  hasLight: boolean;
+  /** What it may do; null before it was let in. */
+  role: "view" | "interact" | null;
+  /** Number of this viewer, and how many there are. */
+  viewer: number | null;
+  viewers: number;
+  /** Updates a second, and most bits a second that come (null for as many as there are). */
+  hz: number | null;
+  bitsPerSecond: number | null;
+  /** Seconds since the moment that the newest light shows; null before any came. */
+  age: number | null;
+  /** Where the time goes, milliseconds: the server's step, waiting there, the network, taking it here. */
+  stepMs: number;
+  queueMs: number;
+  networkMs: number;
+  applyMs: number;
+  /** Points that wait at the server for rays, or for bits. */
+  behind: number;
+  /** Version of the scene's state. */
+  version: number;
+  /** Whether the server has yet to answer what was asked. */
+  pending: boolean;
+}
+
+/** Where a node stands to its parent. */
+export interface Placement {
+  translation: [number, number, number];
+  /** Unit quaternion x, y, z, w. */
+  rotation: [number, number, number, number];
+  scale: [number, number, number];
+}
+
+/** What was changed of the scene since it was loaded. */
+export interface Edits {
+  placed: { node: number; placement: Placement }[];
+  /** Instances that are not there; spares are among them. */
+  removed: number[];
+  lights: { light: number; color: [number, number, number]; intensity: number }[];
+}
+
+/** Something in the picture. */
+export interface Picked {
+  instance: number;
+  node: number;
+  name: string;
+  /** The place on its surface in the world, metres. */
+  position: [number, number, number];
 }
 
 export interface Options {
@@ -59,6 +124,17 @@ export interface Options {
   scene: string;
   /** Address of its recorded stream (.dapple); without it everything is open. It must belong to the same scene. */
   stream?: string;
+  /** Address of a live session of the scene instead (`dapple serve`), `ws:` or `wss:` by the page's own scheme. `time`,
+   * `loop` and `paused` mean nothing then: time is everyone's. */
+  live?: string;
+  /** What gives the viewer its role, where the server asks for that. */
+  token?: string;
+  /** Most bits of light a second, on average over seconds, without the first light. Default: as many as there are. */
+  bits?: number;
+  /** The animation that plays, by its index. Default: the file's first. */
+  animation?: number;
+  /** So many more that there may be of instances, as the server has them. Default none. */
+  spares?: { instance: number; count: number }[];
   /** Default `auto`: WebGPU where it works, else WebGL2. */
   backend?: "auto" | "webgpu" | "webgl2";
   /** Default `psao`. */
@@ -94,13 +170,20 @@ export interface Options {
   /** Called every `statsInterval` milliseconds (default 500) while the page is visible. */
   onStats?: (stats: Stats) => void;
   statsInterval?: number;
+  /** Called when a live session's state or the scene's changes. */
+  onLive?: (status: LiveStatus) => void;
+  /** Called when something that was asked for changed nothing, with the reason. */
+  onRejected?: (message: string) => void;
+  /** Called when something in the picture is picked. */
+  onPicked?: (picked: Picked) => void;
 }
 
 /** Neither WebGPU nor WebGL2 is to be had; the message says so to the reader. */
 export class NoGraphicsError extends Error {}
 
 export interface Viewer {
-  /** Resolves when the whole stream has come and every surface has its light; rejects if the viewer fails before. */
+  /** Resolves when the whole stream (of a live session, its first light) has come and every surface has its light; rejects
+   * if the viewer fails before. */
   readonly ready: Promise<void>;
   readonly paused: boolean;
   /** Seconds. */
@@ -108,14 +191,45 @@ export interface Viewer {
   /** Seconds; 0 for no end. */
   readonly duration: number;
   readonly stats: Stats;
+  /** How the live session stands; null without one. */
+  readonly live: LiveStatus | null;
+  /** What was changed of the scene. */
+  readonly edits: Edits;
+  /** Whether anything of it differs from the start. */
+  readonly isEdited: boolean;
+  /** What was picked last, while it is there. */
+  readonly picked: Picked | null;
   /** What the loader mended in the scene. */
   readonly warnings: string[];
   /** Names of the scene's camera paths; the last circles the scene. */
   readonly cameras: string[];
+  /** Lets time run, or stand still; in a live session for everyone, as everything from here to `reset`. Throws where the
+   * viewer may only look, or has no connection. */
   play(): void;
   pause(): void;
   /** Goes to a time in seconds, as far as the stream has come. */
   seek(time: number): void;
+  /** Places a node; what is left out stays as it is. */
+  moveNode(node: number, placement: Partial<Placement>): void;
+  /** Leaves a node again to the file and its animation. */
+  releaseNode(node: number): void;
+  removeInstance(instance: number): void;
+  restoreInstance(instance: number): void;
+  /** Another instance like one, from those that are not there; beside it if no place is given. */
+  addInstance(like: number, placement?: Partial<Placement>): void;
+  /** How a light shines: linear RGB, and candela (lux if it is directional); null as in the file. */
+  setLight(light: number, setting: { color: [number, number, number]; intensity: number } | null): void;
+  /** Everything as at first. */
+  reset(): void;
+  /** What is seen at a place of the canvas, in CSS pixels from its top left corner. */
+  pick(x: number, y: number): Picked | null;
+  /** Where a node stands now; null if there is no such node. */
+  getPlacement(node: number): Placement | null;
+  /** Whether there is an instance like this one left to add. */
+  canAdd(like: number): boolean;
+  /** Lets a pointer move things over the horizontal plane, or up and down, instead of turning the camera; null ends that.
+   * With Alt (and Shift) it does so always. */
+  setMoving(way: "across" | "upright" | null): void;
   setLoop(loop: boolean): void;
   setMethod(method: Method): void;
   setView(view: View): void;

@@ -6,6 +6,7 @@
 import init, { Core } from "./dapple_web.js";
 import { fetchBytes, fetchChunks } from "./fetch.js";
 import { attachControls } from "./input.js";
+import { LiveLink, liveUrl } from "./live.js";
 
 // Work between pictures, milliseconds at a stretch.
 const SLICE_MS = 8;
@@ -13,7 +14,7 @@ const SLICE_MS = 8;
 // The program is fetched once, however many viewers a page has.
 let program;
 
-/** Shows `options.scene`, lit by `options.stream`, in `canvas`. Rejects with a readable Error where that cannot be. */
+/** Shows `options.scene`, lit by `options.stream` or `options.live`, in `canvas`. Rejects with a readable Error where that cannot be. */
 export async function createViewer(canvas, options = {}) {
   const progress = (stage, loaded, total) => options.onProgress?.({ stage, loaded, total });
   const viewer = new Viewer(canvas, options, progress);
@@ -31,6 +32,9 @@ class Viewer {
   #options;
   #progress;
   #core = null;
+  #link = null;
+  #moving = null;
+  #picked = null;
   #abort = new AbortController();
   #texels = 4096;
   #lastStats = 0;
@@ -52,7 +56,7 @@ class Viewer {
   }
 
   async _open() {
-    const { scene, stream, backend = "auto" } = this.#options;
+    const { scene, stream, live, backend = "auto" } = this.#options;
     if (!scene) throw new Error("No scene was named: give options.scene the address of a .glb file.");
     program ??= fetchBytes(new URL("./dapple_web_bg.wasm", import.meta.url), null, (loaded, total) =>
       this.#progress("program", loaded, total),
@@ -73,29 +77,47 @@ class Viewer {
     const bytes = await fetchBytes(url, this.#abort.signal, (loaded, total) => this.#progress("scene", loaded, total));
     this.#living();
     const name = decodeURIComponent(url.pathname.split("/").pop() || "scene.glb");
-    const { shadowResolution = 0, samples = 0 } = this.#options;
+    const { shadowResolution = 0, samples = 0, animation, spares = [] } = this.#options;
     try {
-      this.#core.loadScene(name, bytes, shadowResolution, samples);
+      const pairs = Uint32Array.from(spares.flatMap(({ instance, count }) => [instance, count]));
+      this.#core.loadScene(name, bytes, shadowResolution, samples, animation, pairs);
     } catch (error) {
       throw new Error(`The scene ${url.href} cannot be shown: ${error.message ?? error}`);
     }
     this.#apply();
     this.#listen();
     requestAnimationFrame(this.#frame);
-    if (stream) this.#fetchStream(new URL(stream, document.baseURI)).catch((error) => this.#fail(error));
+    if (live) this.#openLive(liveUrl(live));
+    else if (stream) this.#fetchStream(new URL(stream, document.baseURI)).catch((error) => this.#fail(error));
     else this.#streamed = true;
   }
 
   #apply() {
-    const { method, view, split, camera, time, loop = true, paused = false, fade } = this.#options;
+    const { method, view, split, camera, time, loop = true, paused = false, fade, live } = this.#options;
     if (method) this.setMethod(method);
     if (view) this.setView(view);
     if (split) this.setSplit(split.position, split.method);
     if (camera) this.setCamera(camera);
     if (fade !== undefined) this.#core.setFade(fade);
+    // In a live session time is everyone's.
+    if (live) return;
     this.#core.setLooping(loop);
     this.#core.setPlaying(!paused);
     if (time) this.seek(time);
+  }
+
+  #openLive(url) {
+    const { token, bits = 0 } = this.#options;
+    this.#core.openLive(token || undefined, bits, Math.floor(Math.random() * 2 ** 32));
+    this.#link = new LiveLink(url, () => this.#core, {
+      status: () => this.#options.onLive?.(this.live),
+      light: () => {
+        if (!this.#streamed) this.#progress("stream", 1, 1);
+        this.#streamed = true;
+      },
+      progress: (loaded, total) => this.#progress("stream", loaded, total),
+      rejected: (message) => this.#options.onRejected?.(message),
+    });
   }
 
   async #fetchStream(url) {
@@ -130,7 +152,16 @@ class Viewer {
 
   #listen() {
     const { controls = true, autoResize = true } = this.#options;
-    if (controls) this.#detach.push(attachControls(this.#canvas, this.#core, () => this.#core !== null));
+    if (controls) {
+      const hand = {
+        moving: () => (this.#mayChange() ? this.#moving : null),
+        mayMove: () => this.#mayChange(),
+        grab: (x, y) => this.#grab(x, y),
+        drag: (x, y, upright) => this.#drag(x, y, upright),
+        release: () => this.#core?.release(),
+      };
+      this.#detach.push(attachControls(this.#canvas, this.#core, () => this.#core !== null, hand));
+    }
     if (autoResize && globalThis.ResizeObserver) {
       const observer = new ResizeObserver(() => this.#fitCanvas());
       observer.observe(this.#canvas);
@@ -215,6 +246,45 @@ class Viewer {
     if (clientWidth > 0 && clientHeight > 0) this.resize(Math.round(clientWidth * ratio), Math.round(clientHeight * ratio));
   }
 
+  #mayChange() {
+    return this.#core !== null && this.#link !== null && this.#core.liveRole() === "interact";
+  }
+
+  // A place in the canvas, in CSS pixels, as pixels of the picture.
+  #pixels(x, y) {
+    const { width, height, clientWidth, clientHeight } = this.#canvas;
+    return [(x * width) / (clientWidth || 1), (y * height) / (clientHeight || 1)];
+  }
+
+  #grab(x, y) {
+    const picked = this.#living().grab(...this.#pixels(x, y));
+    if (picked) this.#pick(picked);
+    return picked !== null;
+  }
+
+  #pick(picked) {
+    this.#picked = picked;
+    this.#options.onPicked?.(picked);
+  }
+
+  #drag(x, y, upright) {
+    try {
+      this.#living().drag(...this.#pixels(x, y), upright);
+      this.#link?.pump();
+    } catch (error) {
+      this.#options.onRejected?.(error.message);
+    }
+  }
+
+  #send(event) {
+    this.#living().sendEvent(JSON.stringify(event));
+    this.#link?.pump();
+  }
+
+  #edit(change) {
+    this.#send({ event: "edit", change });
+  }
+
   get ready() {
     return this.#ready.promise;
   }
@@ -232,7 +302,27 @@ class Viewer {
   }
 
   get stats() {
-    return this.#living().stats(performance.now() / 1000);
+    const stats = this.#living().stats(performance.now() / 1000);
+    stats.live = this.live;
+    return stats;
+  }
+
+  get live() {
+    if (!this.#link) return null;
+    const live = this.#living().liveStatus(performance.now() / 1000);
+    return Object.assign(live, this.#link.status, { applyMs: this.#link.applyMs });
+  }
+
+  get edits() {
+    return JSON.parse(this.#living().edits() ?? "null");
+  }
+
+  get isEdited() {
+    return this.#living().isEdited();
+  }
+
+  get picked() {
+    return this.#picked && this.#living().isThere(this.#picked.instance) ? this.#picked : null;
   }
 
   get warnings() {
@@ -244,15 +334,70 @@ class Viewer {
   }
 
   play() {
-    this.#living().setPlaying(true);
+    if (this.#link) this.#send({ event: "play" });
+    else this.#living().setPlaying(true);
   }
 
   pause() {
-    this.#living().setPlaying(false);
+    if (this.#link) this.#send({ event: "pause" });
+    else this.#living().setPlaying(false);
   }
 
   seek(time) {
-    this.#living().seek(time);
+    if (this.#link) this.#send({ event: "seek", time_s: time });
+    else this.#living().seek(time);
+  }
+
+  pick(x, y) {
+    const picked = this.#living().pick(...this.#pixels(x, y));
+    if (picked) this.#pick(picked);
+    return picked;
+  }
+
+  getPlacement(node) {
+    return this.#living().placement(node);
+  }
+
+  moveNode(node, placement) {
+    const now = this.getPlacement(node);
+    if (!now) throw new Error(`There is no node ${node} that could be moved.`);
+    this.#edit({ edit: "place", node, placement: { ...now, ...placement } });
+  }
+
+  releaseNode(node) {
+    this.#edit({ edit: "release", node });
+  }
+
+  removeInstance(instance) {
+    this.#edit({ edit: "remove", instance });
+  }
+
+  restoreInstance(instance) {
+    this.#edit({ edit: "restore", instance });
+  }
+
+  canAdd(like) {
+    return this.#living().canAdd(like);
+  }
+
+  addInstance(like, placement) {
+    const beside = this.#living().placeBeside(like);
+    if (!beside) throw new Error(`There is no instance ${like} that another could be like.`);
+    this.#send({ event: "add", like, placement: { ...beside, ...placement } });
+  }
+
+  setLight(light, setting) {
+    if (setting) this.#edit({ edit: "light", light, color: setting.color, intensity: setting.intensity });
+    else this.#edit({ edit: "reset-light", light });
+  }
+
+  reset() {
+    this.#edit({ edit: "reset" });
+  }
+
+  setMoving(way) {
+    this.#moving = way;
+    this.#canvas.style.cursor = way ? "move" : "";
   }
 
   setLoop(loop) {
@@ -320,6 +465,7 @@ class Viewer {
 
   dispose() {
     this.#abort.abort();
+    this.#link?.dispose();
     this.#later.port1.close();
     for (const detach of this.#detach.splice(0)) detach();
     const core = this.#core;

@@ -2,6 +2,12 @@
 //
 // One finger or the main button turns; two fingers or another button (or Shift) move sideways, and pinching comes
 // closer; the wheel comes closer. W A S D or the arrows walk, Q and E sink and rise, while the canvas has the focus.
+//
+// Where things may be moved, Alt takes hold of one and moves it over the horizontal plane, with Shift up and down; so
+// does a pointer without Alt while the viewer is set to moving.
+
+// A pointer that goes no farther than this only taps, CSS pixels.
+const TAP = 4;
 
 const KEYS = {
   KeyW: [1, 0, 0],
@@ -16,15 +22,27 @@ const KEYS = {
   KeyQ: [0, 0, -1],
 };
 
-/** Listens until the function that it gives is called. */
-export function attachControls(canvas, core, isAlive) {
+/** Listens until the function that it gives is called. `hand` moves things; see dapple.js. */
+export function attachControls(canvas, core, isAlive, hand) {
   const pointers = new Map();
   const held = new Set();
+  // The pointer that holds a thing, and where it took hold.
+  let holder = null;
   const height = () => canvas.clientHeight || 1;
+  const place = (event) => {
+    const { left, top } = canvas.getBoundingClientRect();
+    return [event.clientX - left, event.clientY - top];
+  };
+
+  const takesHold = (event) => {
+    const wants = event.altKey ? hand.mayMove() : hand.moving() !== null && !event.shiftKey;
+    return wants && event.button === 0 && pointers.size === 0 && hand.grab(...place(event));
+  };
 
   const down = (event) => {
     if (pointers.size >= 2) return;
     canvas.setPointerCapture(event.pointerId);
+    if (isAlive() && takesHold(event)) holder = { id: event.pointerId, x: event.clientX, y: event.clientY, moved: false };
     const sideways = event.button !== 0 || event.shiftKey;
     pointers.set(event.pointerId, { x: event.clientX, y: event.clientY, sideways });
     canvas.focus({ preventScroll: true });
@@ -34,6 +52,13 @@ export function attachControls(canvas, core, isAlive) {
   const move = (event) => {
     const pointer = pointers.get(event.pointerId);
     if (!pointer || !isAlive()) return;
+    if (holder) {
+      if (holder.id !== event.pointerId) return;
+      // A hand that only taps moves nothing.
+      holder.moved ||= Math.hypot(event.clientX - holder.x, event.clientY - holder.y) > TAP;
+      if (holder.moved) hand.drag(...place(event), event.altKey ? event.shiftKey : hand.moving() === "upright");
+      return;
+    }
     const dx = event.clientX - pointer.x;
     const dy = event.clientY - pointer.y;
     const other = [...pointers].find(([id]) => id !== event.pointerId)?.[1];
@@ -53,7 +78,13 @@ export function attachControls(canvas, core, isAlive) {
     }
   };
 
-  const up = (event) => pointers.delete(event.pointerId);
+  const up = (event) => {
+    pointers.delete(event.pointerId);
+    if (holder?.id === event.pointerId) {
+      holder = null;
+      hand.release();
+    }
+  };
 
   const wheel = (event) => {
     if (!isAlive()) return;

@@ -1,6 +1,7 @@
 // The page around the viewer: what is shown comes from the address (?scene=…&stream=…&backend=…) or from viewer.json.
 
 import { NoGraphicsError, createViewer } from "./dapple.js";
+import { SessionPanel, parseBits } from "./session.js";
 
 const byId = (id) => document.getElementById(id);
 const [canvas, ui, loading, stage, bar, message] = ["view", "ui", "loading", "stage", "progress", "message"].map(byId);
@@ -14,10 +15,11 @@ const STAGES = {
   stream: "Fetching the light",
   light: "Laying out the light",
 };
-const NUMBERS = ["time", "shadowResolution", "samples", "fade", "maxPixelRatio"];
+const NUMBERS = ["time", "shadowResolution", "samples", "fade", "maxPixelRatio", "animation"];
 const FLAGS = ["paused", "loop"];
-const WORDS = ["scene", "stream", "backend", "method", "view", "camera"];
+const WORDS = ["scene", "stream", "live", "token", "backend", "method", "view", "camera"];
 
+const session = new SessionPanel();
 let viewer = null;
 let scrubbing = false;
 
@@ -25,7 +27,7 @@ function show(title, text) {
   viewer = null;
   byId("message-title").textContent = title;
   byId("message-text").textContent = text;
-  for (const element of [ui, loading, divider]) element.hidden = true;
+  for (const element of [ui, loading, divider, byId("link"), byId("toast")]) element.hidden = true;
   message.hidden = false;
 }
 
@@ -49,6 +51,10 @@ async function settings() {
   for (const name of WORDS) if (query.has(name)) result[name] = query.get(name);
   for (const name of NUMBERS) if (query.has(name)) result[name] = Number(query.get(name));
   for (const name of FLAGS) if (query.has(name)) result[name] = query.get(name) !== "0";
+  if (query.has("bits")) {
+    result.bits = parseBits(query.get("bits"));
+    if (!result.bits) throw new Error(`?bits=${query.get("bits")} is no number of bits a second: write 500k or 2M.`);
+  }
   if (query.has("split")) result.split = { position: Number(query.get("split")), method: query.get("other") ?? "none" };
   return result;
 }
@@ -79,6 +85,7 @@ function onStats(stats) {
   byId("problem").textContent = stats.problem ?? "";
   byId("problem").hidden = stats.problem === null;
   showTime(stats);
+  session.show(stats.live);
   if (viewer) followCamera();
 }
 
@@ -86,20 +93,25 @@ function age(seconds) {
   return seconds < 1 ? `${(1000 * seconds).toFixed(0)} ms` : `${seconds.toFixed(1)} s`;
 }
 
-function showTime({ time, duration, playing }) {
-  slider.disabled = duration <= 0;
+function showTime({ time, duration, playing, live }) {
+  const isOurs = !live || live.role === "interact";
+  slider.disabled = duration <= 0 || !isOurs;
+  play.disabled = !isOurs;
   slider.max = String(duration || 1);
   if (!scrubbing) slider.value = String(time);
   clock.textContent = narrow.matches || !duration ? `${time.toFixed(1)} s` : `${time.toFixed(1)} / ${duration.toFixed(1)} s`;
   slider.setAttribute("aria-valuetext", `${time.toFixed(1)} seconds`);
   play.textContent = playing ? "❚❚" : "▶";
   play.setAttribute("aria-label", playing ? "Pause" : "Play");
-  play.title = `${playing ? "Pause" : "Play"} (Space)`;
+  const forWhom = !live ? "" : isOurs ? " for everyone" : ": this viewer may only look";
+  play.title = `${playing ? "Pause" : "Play"}${forWhom} (Space)`;
 }
 
 const togglePlay = () => {
-  if (viewer.paused) viewer.play();
-  else viewer.pause();
+  session.try(() => {
+    if (viewer.paused) viewer.play();
+    else viewer.pause();
+  });
   showTime(viewer.stats);
 };
 
@@ -180,7 +192,7 @@ function listen() {
   canvas.addEventListener("wheel", followCamera);
   slider.oninput = () => {
     scrubbing = true;
-    viewer.seek(Number(slider.value));
+    session.try(() => viewer.seek(Number(slider.value)));
     showTime(viewer.stats);
   };
   slider.onchange = () => (scrubbing = false);
@@ -217,11 +229,13 @@ async function start() {
   byId("reload").onclick = () => location.reload();
   const options = await settings();
   const onError = (error) => show("The viewer stopped", error.message);
-  const created = await createViewer(canvas, { ...options, onProgress, onStats, onError });
+  const created = await createViewer(canvas, { ...options, ...session.callbacks, onProgress, onStats, onError });
   viewer = created;
   // For tests, and for the curious at the console.
   globalThis.dapple = created;
-  document.title = `${new URL(options.scene, document.baseURI).pathname.split("/").pop()} · Dapple`;
+  // The scene of a session is named after its content, which says nothing to people.
+  const name = options.live ? "Live" : new URL(options.scene, document.baseURI).pathname.split("/").pop();
+  document.title = `${name} · Dapple`;
   if (options.method) method.value = options.method;
   if (options.view) what.value = options.view;
   if (options.split) {
@@ -231,10 +245,11 @@ async function start() {
   const { path, walking } = created.getCamera();
   listCameras(path ?? (walking ? " walk" : " orbit"));
   listen();
+  if (options.live) session.attach(created);
   applySplit();
   showTime(created.stats);
   ui.hidden = false;
-  if (!options.stream) loading.hidden = true;
+  if (!options.stream || options.live) loading.hidden = true;
   if (narrow.matches) toggleMenu();
   // No ring around the whole window before a key asks for one.
   canvas.focus({ preventScroll: true, focusVisible: false });

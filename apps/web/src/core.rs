@@ -1,4 +1,4 @@
-//! The handle behind `page/dapple.js`: one canvas, one scene, one stream.
+//! The handle behind `page/dapple.js`: one canvas, one scene, and its light, recorded or live.
 
 use std::sync::Arc;
 
@@ -6,13 +6,15 @@ use dapple_client::clock::Clock;
 use dapple_client::rate::Rate;
 use dapple_client::viewer::{DebugView, DrawOptions, LoadProgress, Viewer, ViewerConfig};
 use dapple_render::shade::ShadeParams;
-use dapple_scene::{NoFiles, Scene};
+use dapple_scene::{NoFiles, Scene, Spare};
 use dapple_stream::{Limits, Recording, Replay};
 use js_sys::{Object, Reflect};
 use wasm_bindgen::prelude::*;
 use web_sys::HtmlCanvasElement;
 
 use crate::canvas::Screen;
+use crate::edit::Hand;
+use crate::live::Live;
 use crate::names;
 use crate::steer::Steering;
 
@@ -25,7 +27,9 @@ const LOADING_PICTURE_S: f64 = 0.25;
 #[wasm_bindgen]
 pub struct Core {
     screen: Screen,
-    shown: Option<Shown>,
+    pub(crate) shown: Option<Shown>,
+    pub(crate) live: Option<Live>,
+    pub(crate) hand: Hand,
     limits: Limits,
     recording: Recording,
     replay: Replay,
@@ -40,15 +44,15 @@ pub struct Core {
     /// Clock of the page up to which pictures are drawn.
     draw_until_s: f64,
     pub(crate) changed: bool,
-    bytes: Rate,
-    points: Rate,
+    pub(crate) bytes: Rate,
+    pub(crate) points: Rate,
     pictures: Rate,
 }
 
 /// What there is once the scene is loaded.
-struct Shown {
-    scene: Arc<Scene>,
-    viewer: Viewer,
+pub(crate) struct Shown {
+    pub(crate) scene: Arc<Scene>,
+    pub(crate) viewer: Viewer,
 }
 
 #[wasm_bindgen]
@@ -67,6 +71,8 @@ impl Core {
         Ok(Core {
             screen,
             shown: None,
+            live: None,
+            hand: Hand::default(),
             limits,
             recording: Recording::new(&limits),
             replay: Replay::new(1),
@@ -86,7 +92,8 @@ impl Core {
     }
 
     /// Loads a self-contained scene file; its name says the format. `shadow_resolution` and `samples` as in
-    /// `ViewerConfig`; 0 takes the default.
+    /// `ViewerConfig`; 0 takes the default. `animation` plays instead of the file's first. `spares` are pairs: an instance, and how
+    /// many more there may be of it.
     #[wasm_bindgen(js_name = loadScene)]
     pub fn load_scene(
         &mut self,
@@ -94,11 +101,26 @@ impl Core {
         bytes: &[u8],
         shadow_resolution: u32,
         samples: u32,
+        animation: Option<u32>,
+        spares: &[u32],
     ) -> Result<(), JsError> {
-        let scene = Arc::new(dapple_scene::load(name, bytes, &NoFiles)?);
+        let mut scene = dapple_scene::load(name, bytes, &NoFiles)?;
         if scene.triangle_count() == 0 {
             return Err(JsError::new(&format!("{name} has no triangles: there is nothing to show")));
         }
+        if let Some(animation) = animation {
+            let count = scene.animations.len();
+            if animation as usize >= count {
+                let message =
+                    format!("there is no animation {animation}: {name} has {count}, counted from 0");
+                return Err(JsError::new(&message));
+            }
+            scene.set_active_animation(Some(animation));
+        }
+        let (spares, _) = spares.as_chunks::<2>();
+        let spares: Vec<Spare> = spares.iter().map(|&[instance, count]| Spare { instance, count }).collect();
+        scene.add_spares(&spares)?;
+        let scene = Arc::new(scene);
         let mut shade = ShadeParams::default();
         if shadow_resolution > 0 {
             shade.shadow_resolution = shadow_resolution.clamp(16, 8192);
@@ -153,6 +175,7 @@ impl Core {
         }
         let elapsed_s = self.last_tick_s.map_or(0.0, |last| now_s - last);
         self.last_tick_s = Some(now_s);
+        self.follow_host(now_s);
         let Some(Shown { scene, viewer }) = &mut self.shown else { return Ok(false) };
         self.changed |= self.clock.advance(elapsed_s);
 
@@ -175,6 +198,9 @@ impl Core {
         }
         let camera = self.steering.camera(scene, self.clock.time_s());
         let (size, time_s) = (self.screen.size(), self.clock.time_s());
+        if let Some(live) = &mut self.live {
+            live.guest.look(&camera, size.0 as f32 / size.1 as f32);
+        }
         let options = &self.options;
         let drew =
             self.screen.draw(|gpu, target| viewer.draw(gpu, target, size, &camera, time_s, now_s, options));
@@ -267,6 +293,7 @@ impl Core {
             if info.backend == dapple_gpu::wgpu::Backend::BrowserWebGpu { "webgpu" } else { "webgl2" };
         let age_s = stats.last_frame_s.map_or(JsValue::NULL, |last| (now_s - last).max(0.0).into());
         let (heap_bytes, card_bytes) = stats.memory_bytes;
+        let (time_s, duration_s, is_playing) = self.shown_time(now_s);
         object(&[
             ("fps", self.pictures.per_second(now_s).into()),
             ("megabitsPerSecond", (self.bytes.per_second(now_s) * 8e-6).into()),
@@ -283,9 +310,9 @@ impl Core {
             ("adapter", info.name.into()),
             ("width", self.screen.size().0.into()),
             ("height", self.screen.size().1.into()),
-            ("time", self.clock.time_s().into()),
-            ("duration", self.clock.duration_s().into()),
-            ("playing", self.clock.is_playing().into()),
+            ("time", time_s.into()),
+            ("duration", duration_s.into()),
+            ("playing", is_playing.into()),
             ("problem", problem.map_or(JsValue::NULL, JsValue::from_str)),
         ])
     }
@@ -294,6 +321,25 @@ impl Core {
     pub fn warnings(&self) -> Vec<String> {
         let scene = self.shown.as_ref().map(|shown| &shown.scene);
         scene.iter().flat_map(|scene| &scene.warnings).map(|warning| warning.message.clone()).collect()
+    }
+
+    /// Time of the scene and where it begins again (0 for never), seconds, and whether it runs.
+    fn shown_time(&self, now_s: f64) -> (f64, f64, bool) {
+        match (&self.live, &self.shown) {
+            (Some(live), Some(shown)) => {
+                // The host's time knows no end: it is shown as that of the animation.
+                let time_s = self.host_time_s(now_s).unwrap_or(self.clock.time_s());
+                let duration_s = self.steering.duration_s(&shown.scene);
+                let time_s = if duration_s > 0.0 { time_s.rem_euclid(duration_s) } else { time_s };
+                (time_s, duration_s, live.guest.clock().playing)
+            }
+            _ => (self.clock.time_s(), self.clock.duration_s(), self.clock.is_playing()),
+        }
+    }
+
+    /// Pixels of the picture, width and height.
+    pub(crate) fn size(&self) -> (u32, u32) {
+        self.screen.size()
     }
 
     /// Width of the picture per height.

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! fetch, pointer, keys, frames of the display (JavaScript) ─► Core ─► clock and replay (which frame of the stream, when) ─► Viewer ─► canvas
+//!        messages of a live session (JavaScript's socket) ◄─►      ─► guest (what is lit and changed, and when) ─┘
 //! ```
 //!
 //! Requests, events and the clock are the page's; this side owns the canvas, and everything that is counted in points,
@@ -11,6 +12,11 @@
 mod canvas;
 #[cfg(target_arch = "wasm32")]
 mod core;
+#[cfg(target_arch = "wasm32")]
+mod edit;
+pub mod grab;
+#[cfg(target_arch = "wasm32")]
+mod live;
 pub mod names;
 #[cfg(target_arch = "wasm32")]
 mod steer;

@@ -55,6 +55,16 @@ impl Steering {
         if animated > 0.0 { animated } else { self.paths.first().map_or(0.0, CameraPath::duration_s) }
     }
 
+    /// The scene's diagonal at its start, metres.
+    pub(crate) fn diagonal_m(&self) -> f32 {
+        self.diagonal_m
+    }
+
+    /// Whether the picture changes with the scene's time: something is animated, or the camera follows a path.
+    pub(crate) fn follows_time(&self, scene: &Scene) -> bool {
+        scene.active_animation.is_some() || matches!(self.aim, Aim::Path(_))
+    }
+
     /// The camera at a time of the scene, seconds.
     pub(crate) fn camera(&self, scene: &Scene, time_s: f64) -> PosedCamera {
         match (self.aim, self.paths.first()) {

@@ -347,6 +347,7 @@ pub struct Refusal {
     pub message: String,
 }
 
+#[cfg(feature = "host")]
 impl Refusal {
     pub(crate) fn new(reason: Reason, message: impl Into<String>) -> Refusal {
         Refusal { reason, message: message.into() }

@@ -12,7 +12,7 @@ use wasm_bindgen_cli_support::Bindgen;
 /// Name of the glue (`.js`) and, with `_bg`, of the program (`.wasm`).
 const NAME: &str = "dapple_web";
 /// Most bytes of the program as a server sends it, compressed.
-const MAX_GZIPPED_BYTES: usize = 1_500_000;
+const MAX_GZIPPED_BYTES: usize = 1_600_000;
 
 fn main() -> ExitCode {
     let arguments: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();

@@ -12,7 +12,7 @@ import { createServer } from "node:http";
 import { readFile, writeFile } from "node:fs/promises";
 import { join, normalize } from "node:path";
 
-import { chromium } from "playwright-core";
+import { launch } from "./launch.mjs";
 
 const TYPES = {
   html: "text/html",
@@ -21,17 +21,6 @@ const TYPES = {
   json: "application/json",
   wasm: "application/wasm",
 };
-// Software drawing for both interfaces; leaving one out loses WebGPU's device or WebGL2.
-const FLAGS = [
-  "--no-sandbox",
-  "--enable-unsafe-webgpu",
-  "--use-webgpu-adapter=swiftshader",
-  "--enable-features=Vulkan",
-  "--use-vulkan=swiftshader",
-  "--use-angle=swiftshader",
-  "--enable-unsafe-swiftshader",
-  "--ignore-gpu-blocklist",
-];
 const PATIENCE_MS = 120_000;
 
 const plan = JSON.parse(await readFile(process.argv[2], "utf8"));
@@ -51,11 +40,7 @@ const server = createServer(async (request, response) => {
 await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
 const origin = `http://127.0.0.1:${server.address().port}`;
 
-const browser = await chromium.launch({
-  executablePath: plan.browser,
-  headless: true,
-  args: plan.flags ?? FLAGS,
-});
+const browser = await launch(plan.browser, plan.flags);
 const report = [];
 try {
   for (const page of plan.pages) report.push(await open(page));
