@@ -71,6 +71,8 @@ export interface LiveStatus {
   /** Whether the server has let the viewer in, and whether light ever came. */
   connected: boolean;
   hasLight: boolean;
+  /** How much of its first light the server has made, 0 to 1; 0 before it has said so. */
+  started: number;
   /** What it may do; null before it was let in. */
   role: "view" | "interact" | null;
   /** Number of this viewer, and how many there are. */

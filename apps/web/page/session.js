@@ -143,6 +143,9 @@ function sentence(live) {
     // A server that is full is there; one that says nothing may not be.
     return live.reason === "full" ? `the server is full: trying again ${wait}` : `reconnecting ${wait}`;
   }
+  if (!live.hasLight && live.started > 0 && live.started < 1) {
+    return `connected; the server makes its light: ${Math.floor(100 * live.started)} %`;
+  }
   if (!live.hasLight) return "connected, waiting for the first light";
   const others = live.viewers > 1 ? ` · ${live.viewers} viewers` : "";
   return `live${live.role === "view" ? " · view only" : ""}${others}`;

@@ -68,7 +68,13 @@ impl Core {
     pub fn live_text(&mut self, text: &str) -> Result<Option<String>, JsValue> {
         let (Some(live), Some(shown)) = (&mut self.live, &mut self.shown) else { return Ok(None) };
         Ok(match live.guest.receive_text(text).map_err(|error| ended(&error))? {
-            News::Welcome(_) => Some("welcome".to_owned()),
+            News::Welcome(goes_on) => {
+                if !goes_on {
+                    // What is shown stays until the host's first snapshot.
+                    shown.viewer.outdate();
+                }
+                Some("welcome".to_owned())
+            }
             News::State => {
                 shown.viewer.set_edits(live.guest.edits());
                 self.changed = true;
@@ -177,6 +183,7 @@ impl Core {
             ("version", (guest.version() as f64).into()),
             ("pending", guest.has_pending().into()),
             ("hasLight", live.has_light.into()),
+            ("started", (f64::from(status.started) / 1000.0).into()),
         ])
     }
 
