@@ -135,7 +135,8 @@ export class SessionPanel {
 }
 
 function sentence(live) {
-  const after = live.message ? `: ${live.message}` : "";
+  // Of scenes the server tells hashes, which say nothing to people.
+  const after = live.message && live.reason !== "scene" ? `: ${live.message}` : "";
   if (live.state === "connecting") return "connecting";
   if (live.state === "refused") return `not live${after}`;
   if (live.state === "reconnecting") {
