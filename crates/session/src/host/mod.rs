@@ -333,6 +333,10 @@ impl Host {
         message: Result<FromViewer, Refusal>,
         now_us: u64,
     ) -> Result<(), Refusal> {
+        if connected(&mut self.viewers, link).is_none() {
+            // What still comes from one that has gone is nobody's.
+            return Ok(());
+        }
         let taken = message.and_then(|message| self.take(link, message, now_us));
         self.expel_unless(taken, link, now_us)
     }
