@@ -24,7 +24,7 @@ const MOST_MB: f64 = 8.0;
 const SETTLE: Duration = Duration::from_secs(20);
 
 pub(crate) fn run(args: &SoakArgs) -> Result<()> {
-    if !(args.seconds.is_finite() && args.seconds >= 5.0) || !(2..=10_000).contains(&args.viewers) {
+    if !(args.seconds.is_finite() && args.seconds >= 5.0 && (2..=10_000).contains(&args.viewers)) {
         bail!("--seconds must be at least 5, --viewers 2 to 10000");
     }
     let max_viewers = (4 * args.viewers).to_string();

@@ -61,18 +61,15 @@ impl Remote {
             .context("cannot start the thread that receives")?;
         let thread_shared = shared.clone();
         let run = move || {
+            // Who listens no more has ended; who does not listen now will hear of it.
+            let hand_on = |piece| {
+                if frame_sender.try_send(piece).is_err() {
+                    overflows.store(true, Ordering::Relaxed);
+                }
+            };
             let on_news = |_: &mut Guest, news| match news {
-                News::Light(frame) if !frame.is_empty() => {
-                    // Who listens no more has ended; who does not listen now will hear of it.
-                    if frame_sender.try_send(Piece::Frame(frame)).is_err() {
-                        overflows.store(true, Ordering::Relaxed);
-                    }
-                }
-                News::Welcome(false) => {
-                    if frame_sender.try_send(Piece::Anew).is_err() {
-                        overflows.store(true, Ordering::Relaxed);
-                    }
-                }
+                News::Light(frame) if !frame.is_empty() => hand_on(Piece::Frame(frame)),
+                News::Welcome(false) => hand_on(Piece::Anew),
                 News::Rejected(message) => drop(rejected_sender.send(message)),
                 _ => {}
             };

@@ -124,7 +124,7 @@ impl Drill {
         let until_us = self.now_us + (seconds * 1e6) as u64;
         while self.now_us < until_us {
             self.now_us += STEP_US;
-            if self.now_us % TICK_US == 0 {
+            if self.now_us.is_multiple_of(TICK_US) {
                 self.tick();
             }
             for peer in 0..self.peers.len() {

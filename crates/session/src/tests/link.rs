@@ -83,8 +83,7 @@ impl<M: Clone> FaultyLink<M> {
     }
 
     pub(super) fn put(&mut self, message: M, bytes: usize, now_us: u64) {
-        if self.faults.bytes_per_s > 0 {
-            let takes_us = bytes as u64 * 1_000_000 / self.faults.bytes_per_s;
+        if let Some(takes_us) = (bytes as u64 * 1_000_000).checked_div(self.faults.bytes_per_s) {
             self.busy_until_us = self.busy_until_us.max(now_us) + takes_us;
         }
         let through_us = self.busy_until_us.max(now_us);
