@@ -184,7 +184,7 @@ async fn health_answer(State(shared): State<Shared>) -> Response {
     };
     let ready = phase == Phase::Serving;
     let body = json!({
-        "status": name, "ready": ready, "detail": detail, "scene": shared.asset.title,
+        "status": name, "ready": ready, "detail": detail, "scene": shared.asset.scene.name,
         "version": env!("CARGO_PKG_VERSION"),
     });
     let headers = [(header::CONTENT_TYPE, "application/json"), (header::CACHE_CONTROL, "no-store")];
@@ -205,7 +205,7 @@ async fn no_page_answer(State(shared): State<Shared>, headers: HeaderMap) -> Htm
         "<!doctype html><title>Dapple</title><h1>{} is lit here</h1><p>The page that shows it has not been built: run \
          <code>cargo xtask wasm</code> and start again, or name its folder with <code>--page</code>.<p>Without it: \
          <code>dapple view --url http://{}/</code>",
-        escape(&shared.asset.title),
+        escape(&shared.asset.scene.name),
         escape(host)
     ))
 }
