@@ -66,9 +66,10 @@ fn ten_thousand_connects_leave_no_more_than_may_be_there() {
     let scene = scene();
     let config = HostConfig { max_viewers: 50, ..HostConfig::default() };
     let mut host = Host::new(scene.clone(), config, 0);
-    let quiet = join(&mut host, &hello(&scene), 0).unwrap();
+    let hello = hello(&scene);
+    let quiet = join(&mut host, &hello, 0).unwrap();
     for number in 1..=10_000 {
-        if let Ok(link) = join(&mut host, &hello(&scene), number)
+        if let Ok(link) = join(&mut host, &hello, number)
             && number % 2 == 0
         {
             host.leave(link, number);
