@@ -491,3 +491,22 @@ fn with_a_certificate_it_speaks_tls_alone() {
     let arguments = [&SMALL[..], &["--tls-cert", "cert.pem", "--tls-key", "other.pem"]].concat();
     fail(folder.path(), &arguments, &["do not belong together"]);
 }
+
+#[test]
+fn it_can_be_ended_while_it_makes_its_first_light() {
+    let folder = TempDir::new().unwrap();
+    // Enough points for a while.
+    let arguments = "serve --builtin cornell --points 4000 --port 0 --threads 1 --record x.dapple";
+    let served = Served::run(folder.path(), &arguments.split(' ').collect::<Vec<_>>());
+    let start = Instant::now();
+    while !served.text("/health").contains("starting") {
+        assert!(start.elapsed() < Duration::from_secs(20), "{}", served.text("/health"));
+    }
+    let mut viewer = Viewer::join(served.port, &served.scene(), config(1));
+    viewer.until("it hears how far the light is", |v| v.guest.status().started > 0);
+    assert!(!viewer.has_light() && viewer.guest.status().started < 1000);
+    served.signal("-INT");
+    viewer.until("it hears of the end", |v| v.refused.is_some());
+    assert!(served.wait().0);
+    assert_eq!(common::command::files(folder.path()), Vec::<std::path::PathBuf>::new());
+}

@@ -1,7 +1,7 @@
 //! The thread that lights: a step a tick, frames for all viewers.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
@@ -111,7 +111,7 @@ impl Engine {
             return Ok(Light::Workers(Box::new(merger), workforce, patience));
         }
         let part = |done: usize, of: usize| (1000 * done / of.max(1)) as u32;
-        let beat = Beat::default();
+        let company = Company::default();
         let progress = |progress| {
             // Laying, tracing and cutting take about these parts of a start, as they do of a recording's.
             let (what, of_stage, from, to) = match progress {
@@ -120,10 +120,15 @@ impl Engine {
                 Progress::Cutting(done, of) => ("finding what stands between", part(done, of), 900, 1000),
             };
             hub.set_phase(Phase::Starting(what, of_stage));
-            beat.tell(&hub, from + (to - from) * of_stage / 1000);
+            company.mille.store(from + (to - from) * of_stage / 1000, Ordering::Relaxed);
         };
         let started = Instant::now();
-        let mut server = Server::new(scene, &self.config, &progress)?;
+        let mut server = std::thread::scope(|scope| {
+            scope.spawn(|| company.keep(&hub));
+            // However the start ends, so does the company.
+            let _end = End(&company.is_over);
+            Server::new(scene, &self.config, &progress)
+        })?;
         for bits_per_s in rungs.iter().skip(1) {
             server.add_stream(*bits_per_s);
         }
@@ -214,25 +219,34 @@ impl Engine {
 
 /// Keeps viewers company while there is no light yet: they hear how far it is, and each other's events.
 #[derive(Default)]
-struct Beat {
-    last_us: AtomicU64,
+struct Company {
+    mille: AtomicU32,
+    is_over: AtomicBool,
 }
 
-impl Beat {
-    const EVERY_US: u64 = 250_000;
+impl Company {
+    const EVERY: Duration = Duration::from_millis(250);
 
-    fn tell(&self, hub: &Hub, mille: u32) {
-        let (now_us, last_us) = (hub.now_us(), self.last_us.load(Ordering::Relaxed));
-        let is_due = now_us.saturating_sub(last_us) >= Beat::EVERY_US;
-        let swap = |order| self.last_us.compare_exchange(last_us, now_us, order, order);
-        if !is_due || swap(Ordering::Relaxed).is_err() {
-            return;
+    fn keep(&self, hub: &Hub) {
+        while !self.is_over.load(Ordering::Relaxed) {
+            // 0 says nothing, and 1000 that it is there.
+            let started = self.mille.load(Ordering::Relaxed).clamp(1, 999);
+            let mut host = hub.host();
+            let tick = host.begin_step(hub.now_us());
+            host.end_step(&tick, hub.now_us(), Status { started, ..Status::default() });
+            drop(host);
+            hub.step_done();
+            std::thread::sleep(Company::EVERY);
         }
-        let mut host = hub.host();
-        let tick = host.begin_step(now_us);
-        host.end_step(&tick, now_us, Status { started: mille.min(999), ..Status::default() });
-        drop(host);
-        hub.step_done();
+    }
+}
+
+/// Sets a flag when it goes.
+struct End<'a>(&'a AtomicBool);
+
+impl Drop for End<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
     }
 }
 

@@ -56,6 +56,9 @@ const DRAIN: Duration = Duration::from_secs(5);
 /// How the names of threads begin that trace and encode.
 pub(crate) const LIGHT_THREADS: &str = "light";
 
+/// How long the light's last step, and the end of a recording, may take.
+const LAST_STEP: Duration = Duration::from_secs(5);
+
 /// Connections beside those of viewers: for pages, scenes and figures.
 const OTHER_CONNECTIONS: usize = 256;
 
@@ -152,6 +155,18 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
 
     drain(&runtime, &hub, &stop_accepting);
     stop_light.store(true, Ordering::Relaxed);
+    let until = Instant::now() + LAST_STEP;
+    while !engine.is_finished() && Instant::now() < until {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    if !engine.is_finished() {
+        // In the middle of its start, which the program's end ends. There is nothing in its recording yet.
+        if let Some(path) = &args.record {
+            recording::discard(path);
+        }
+        runtime.shutdown_timeout(Duration::from_millis(500));
+        return ended;
+    }
     let light = engine.join().map_err(|_| anyhow!("the light ended in a panic"))?;
     runtime.shutdown_timeout(Duration::from_millis(500));
     light.and(ended)

@@ -26,6 +26,17 @@ pub(crate) struct LiveRecording {
     is_broken: bool,
 }
 
+/// The file that grows until it is whole.
+fn partial(path: &Path) -> PathBuf {
+    path.with_extension(format!("{}.tmp", std::process::id()))
+}
+
+/// Removes what was begun of a recording that nobody will finish.
+pub(crate) fn discard(path: &Path) {
+    // It may not even have been begun.
+    let _ = std::fs::remove_file(partial(path));
+}
+
 impl LiveRecording {
     pub(crate) fn create(path: &Path, scene_hash: [u8; 32], name: &str) -> Result<LiveRecording> {
         let mut name = name.to_owned();
@@ -34,7 +45,7 @@ impl LiveRecording {
         }
         let header = RecordingHeader { scene_hash, name, duration_us: MAX_DURATION_US };
         let (recorder, bytes) = Recorder::new(&header).context("--record")?;
-        let partial = path.with_extension(format!("{}.tmp", std::process::id()));
+        let partial = partial(path);
         let file = File::create(&partial).with_context(|| format!("cannot write {}", partial.display()))?;
         let mut recording = LiveRecording {
             path: path.to_owned(),

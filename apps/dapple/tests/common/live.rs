@@ -30,8 +30,12 @@ impl Served {
     /// Starts one on any port, or on one that is given.
     pub(crate) fn start(folder: &Path, port: u16, more: &[&str]) -> Served {
         let port = port.to_string();
-        let arguments = [&SMALL[..], &["--port", &port], more].concat();
-        let mut command = dapple(folder, &arguments);
+        Served::run(folder, &[&SMALL[..], &["--port", &port], more].concat())
+    }
+
+    /// Starts what these arguments say.
+    pub(crate) fn run(folder: &Path, arguments: &[&str]) -> Served {
+        let mut command = dapple(folder, arguments);
         let mut child = command.env_remove("DAPPLE_TOKENS").stdout(Stdio::piped()).spawn().unwrap();
         let mut out = BufReader::new(child.stdout.take().unwrap());
         let port = loop {
