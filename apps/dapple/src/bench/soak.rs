@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail};
 use dapple_scene::{Edit, Placement};
 use dapple_session::{Event, GuestConfig};
+use dapple_trace::sampling::hash;
 use tokio::sync::watch;
 
 use super::served::Served;
@@ -83,7 +84,7 @@ async fn soak(served: &mut Served, args: &SoakArgs) -> Result<Outcome> {
     }
     let mut places = Vec::new();
     for place in 0..args.viewers - 2 {
-        let random = Random(args.seed.wrapping_mul(1 << 20) + u64::from(place));
+        let random = Random { seed: args.seed, place: u64::from(place), number: 0 };
         let live = (served.live.clone(), served.scene.clone(), served.url.clone());
         places.push(tokio::spawn(live_on(live, place, random, until)));
     }
@@ -304,16 +305,17 @@ fn slope(samples: &[(f64, f64)]) -> f64 {
     if below > 0.0 { above / below } else { 0.0 }
 }
 
-/// Splitmix64.
-struct Random(u64);
+/// Numbers of a seed and a place, one after the other.
+struct Random {
+    seed: u64,
+    place: u64,
+    number: u32,
+}
 
 impl Random {
     fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ z >> 31
+        self.number = self.number.wrapping_add(1);
+        u64::from(hash(self.seed, self.place, self.number))
     }
 
     fn below(&mut self, n: u64) -> u64 {

@@ -32,7 +32,6 @@ pub(crate) struct Log {
     pub(crate) first_s: Option<f64>,
     pub(crate) first_bytes: u64,
     pub(crate) failures: Vec<String>,
-    pub(crate) rejected: u32,
 }
 
 impl Bot {
@@ -82,7 +81,6 @@ impl Bot {
                     subscriber.outdate();
                 }
             }
-            News::Rejected(_) => log.rejected += 1,
             _ => {}
         }
     }

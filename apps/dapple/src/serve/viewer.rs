@@ -22,7 +22,7 @@ pub(crate) async fn talk(
     mut inbound: impl Inbound,
     is_foreign: bool,
 ) {
-    match join(&hub, &out, &mut inbound, is_foreign).await {
+    match join(&hub, is_reliable(&out), &mut inbound, is_foreign).await {
         Ok(link) => {
             // However this ends, its place is free then.
             let place = Place { hub: &hub, link };
@@ -60,10 +60,14 @@ async fn refuse(out: &mut impl Outbound, refusal: Refusal) {
     let _ = tokio::time::timeout(SEND_TIMEOUT, out.send_text(text.into())).await;
 }
 
+fn is_reliable<O: Outbound>(_: &O) -> bool {
+    O::IS_RELIABLE
+}
+
 /// Waits for a hello and lets its viewer in.
-async fn join<O: Outbound>(
+async fn join(
     hub: &Hub,
-    _out: &O,
+    is_reliable: bool,
     inbound: &mut impl Inbound,
     is_foreign: bool,
 ) -> Result<Link, Option<Refusal>> {
@@ -84,7 +88,7 @@ async fn join<O: Outbound>(
         FromViewer::Hello(hello) => hello,
         _ => return Err(malformed("the first message must be a hello".to_owned())),
     };
-    let arrival = hub.arrival(O::IS_RELIABLE, is_foreign).map_err(|error| {
+    let arrival = hub.arrival(is_reliable, is_foreign).map_err(|error| {
         tracing::error!("the system gives no random numbers: {error}");
         Some(Refusal { reason: Reason::Closing, message: "the host cannot let anyone in".to_owned() })
     })?;

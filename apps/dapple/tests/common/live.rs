@@ -1,6 +1,6 @@
 //! A served scene and viewers of it, for tests.
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, Read};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
@@ -14,6 +14,7 @@ use tokio_tungstenite::tungstenite::protocol::WebSocketConfig;
 use tokio_tungstenite::tungstenite::{Error, Message, WebSocket, client};
 
 use super::command::dapple;
+use super::http;
 
 /// A scene that is lit within a second.
 pub(crate) const SMALL: [&str; 9] =
@@ -51,15 +52,7 @@ impl Served {
 
     /// Status, headers in small letters, and body of a GET.
     pub(crate) fn get(&self, path: &str, headers: &str) -> (u16, String, Vec<u8>) {
-        let mut stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
-        write!(stream, "GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n{headers}\r\n")
-            .unwrap();
-        let mut answer = Vec::new();
-        stream.read_to_end(&mut answer).unwrap();
-        let end = answer.windows(4).position(|w| w == b"\r\n\r\n").unwrap();
-        let head = String::from_utf8_lossy(&answer[..end]).to_lowercase();
-        let status = head.split_whitespace().nth(1).unwrap().parse().unwrap();
-        (status, head, answer[end + 4..].to_vec())
+        http::get(self.port, path, headers)
     }
 
     pub(crate) fn text(&self, path: &str) -> String {

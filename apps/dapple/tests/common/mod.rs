@@ -4,6 +4,7 @@
 
 pub(crate) mod baked;
 pub(crate) mod command;
+pub(crate) mod http;
 pub(crate) mod live;
 pub(crate) mod made;
 
