@@ -143,7 +143,7 @@ impl Engine {
             let mut host = hub.host();
             let tick = host.begin_step(hub.now_us());
             let watched: Vec<bool> =
-                (0..host.config().rungs.len()).map(|rung| host.rung_viewers(rung) > 0).collect();
+                (0..host.config().rungs.len()).map(|rung| host.is_watched(rung)).collect();
             (tick, host.looks(MOST_VIEWS, turn), watched)
         };
         if let Some(edits) = &tick.edits {

@@ -78,13 +78,21 @@ impl Hub {
     }
 
     /// What a new connection is told apart by.
-    pub(crate) fn arrival(&self, is_reliable: bool, is_foreign: bool) -> Result<Arrival, getrandom::Error> {
+    pub(crate) fn arrival(&self, is_reliable: bool, whence: Whence) -> Result<Arrival, getrandom::Error> {
+        let Whence { is_foreign, shares } = whence;
         let mut secret = [0; 16];
         getrandom::fill(&mut secret)?;
         let unix_us =
             SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_micros() as u64);
-        Ok(Arrival { key: dapple_session::host::hex(&secret), is_reliable, is_foreign, unix_us })
+        Ok(Arrival { key: dapple_session::host::hex(&secret), is_reliable, is_foreign, shares, unix_us })
     }
+}
+
+/// Where a viewer's words come from: see [`Arrival`].
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Whence {
+    pub(crate) is_foreign: bool,
+    pub(crate) shares: bool,
 }
 
 /// Shared.

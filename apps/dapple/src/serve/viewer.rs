@@ -6,7 +6,7 @@ use dapple_session::host::{Link, Next, Outgoing};
 use dapple_session::{FromHost, FromViewer, Reason, Refusal};
 use tokio::sync::Notify;
 
-use super::hub::{Hub, SharedHub};
+use super::hub::{Hub, SharedHub, Whence};
 use crate::transport::{Inbound, LinkError, Message, Outbound};
 
 /// A hello must come within this time.
@@ -16,13 +16,8 @@ const HELLO_TIMEOUT: Duration = Duration::from_secs(5);
 const SEND_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Talks to a viewer until one of both ends it.
-pub(crate) async fn talk(
-    hub: SharedHub,
-    mut out: impl Outbound,
-    mut inbound: impl Inbound,
-    is_foreign: bool,
-) {
-    match join(&hub, is_reliable(&out), &mut inbound, is_foreign).await {
+pub(crate) async fn talk(hub: SharedHub, mut out: impl Outbound, mut inbound: impl Inbound, whence: Whence) {
+    match join(&hub, is_reliable(&out), &mut inbound, whence).await {
         Ok(link) => {
             // However this ends, its place is free then.
             let place = Place { hub: &hub, link };
@@ -69,7 +64,7 @@ async fn join(
     hub: &Hub,
     is_reliable: bool,
     inbound: &mut impl Inbound,
-    is_foreign: bool,
+    whence: Whence,
 ) -> Result<Link, Option<Refusal>> {
     let malformed = |message: String| Some(Refusal { reason: Reason::Malformed, message });
     let message = tokio::time::timeout(HELLO_TIMEOUT, inbound.receive()).await.map_err(|_| {
@@ -88,7 +83,7 @@ async fn join(
         FromViewer::Hello(hello) => hello,
         _ => return Err(malformed("the first message must be a hello".to_owned())),
     };
-    let arrival = hub.arrival(is_reliable, is_foreign).map_err(|error| {
+    let arrival = hub.arrival(is_reliable, whence).map_err(|error| {
         tracing::error!("the system gives no random numbers: {error}");
         Some(Refusal { reason: Reason::Closing, message: "the host cannot let anyone in".to_owned() })
     })?;

@@ -145,7 +145,7 @@ async fn live_answer(
         .max_write_buffer_size(1 << 20)
         .on_upgrade(async move |socket| {
             let (out, inbound) = ws::accepted(socket);
-            talk(shared.hub, out, inbound, is_foreign).await;
+            talk(shared.hub, out, inbound, Whence { is_foreign, shares: false }).await;
             drop(permit);
         })
 }

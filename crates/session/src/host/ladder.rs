@@ -128,6 +128,13 @@ impl Rung {
         }
     }
 
+    /// A snapshot of just what is held; if there is none, one is wanted.
+    pub(super) fn snapshot_of(&mut self, held: Held) -> Option<Arc<Entry>> {
+        let snapshot = self.snapshot.clone().filter(|snapshot| snapshot.held == held);
+        self.is_wanted |= snapshot.is_none();
+        snapshot
+    }
+
     /// Who is behind by more gets a snapshot instead.
     fn jump_bytes(&self) -> usize {
         // Before one was made its length is not known.

@@ -3,7 +3,9 @@
 mod access;
 mod bucket;
 mod ladder;
+mod groups;
 mod queue;
+mod shared;
 mod state;
 mod types;
 mod viewer;
@@ -15,14 +17,15 @@ use dapple_scene::{Edits, Scene};
 use dapple_stream::Frame;
 
 pub use access::Access;
+pub use groups::{LightGroups, Piece, StateGroups};
 use ladder::Rung;
 use queue::overtaken;
 use state::SceneState;
-pub use types::{Arrival, HostConfig, HostCounts, Link, Next, Outgoing, Tick};
+pub use types::{Arrival, HostConfig, HostCounts, Link, Next, Outgoing, Shared, SharedLight, Tick};
 use viewer::Viewer;
 
 use crate::{
-    Event, FromHost, FromViewer, Hello, LookCamera, PROTOCOL, Reason, Refusal, Role, SceneClock, Welcome,
+    Event, FromHost, FromViewer, Held, Hello, LookCamera, PROTOCOL, Reason, Refusal, Role, SceneClock, Welcome,
 };
 
 /// Most ages kept between two questions.
@@ -33,6 +36,14 @@ const MAX_QUEUED_EVENTS: usize = 4096;
 
 /// Most events that take effect in one step: each place costs a look at all nodes of the scene. The others wait for the next.
 const MAX_EVENTS_A_STEP: usize = 256;
+
+/// How a viewer is let in.
+struct Admission {
+    role: Role,
+    rung: usize,
+    held: Option<Held>,
+    goes_on: bool,
+}
 
 /// The server's end of all sessions.
 pub struct Host {
@@ -45,6 +56,8 @@ pub struct Host {
     /// What came since the last step, by viewer and number.
     queue: VecDeque<(u64, u32, Event)>,
     rungs: Vec<Rung>,
+    /// Whether somebody else than viewers takes a rung.
+    shared: Vec<bool>,
     /// The last step's message for those who get no light with it.
     tick: Option<Arc<[u8]>>,
     closing: Option<Refusal>,
@@ -71,6 +84,7 @@ impl Host {
             next_viewer: 1,
             queue: VecDeque::new(),
             rungs: config.rungs.iter().map(|_| Rung::default()).collect(),
+            shared: vec![false; config.rungs.len()],
             tick: None,
             closing: None,
             counts: HostCounts::default(),
@@ -123,7 +137,8 @@ impl Host {
         }
         let role = self.config.access.role(hello.token.as_deref(), arrival.is_foreign)?;
         let known = hello.key.as_deref().and_then(|key| {
-            self.viewers.iter().find(|(_, viewer)| access::equal(&viewer.key, key)).map(|(id, _)| *id)
+            let has_key = |viewer: &Viewer| !viewer.is_observer && access::equal(&viewer.key, key);
+            self.viewers.iter().find(|(_, viewer)| has_key(viewer)).map(|(id, _)| *id)
         });
         let id = match known {
             Some(id) => {
@@ -131,21 +146,30 @@ impl Host {
                 id
             }
             None => {
-                if self.viewers.len() >= self.config.max_viewers as usize {
+                let viewers = self.viewers.values().filter(|viewer| !viewer.is_observer).count();
+                if viewers >= self.config.max_viewers as usize {
                     self.forget_one_that_left()?;
                 }
                 let id = self.next_viewer;
                 self.next_viewer += 1;
-                self.viewers.insert(id, Viewer::new(arrival.key, &self.config, now_us));
+                self.viewers.insert(id, Viewer::new(arrival.key.clone(), &self.config, now_us));
                 id
             }
         };
         let rung = self.rung_for(hello.bits_per_s);
-        let bits_per_s = self.config.rungs[rung];
-        let viewer = self.viewers.get_mut(&id).expect("it was found or inserted");
-        // Light of another stream, or of another host, has epochs of its own.
-        let goes_on = known.is_some() && viewer.rung == rung;
-        viewer.connect(role, rung, hello.held.filter(|_| goes_on), arrival.is_reliable, now_us);
+        let is_same = known.is_some_and(|id| self.viewers[&id].rung == rung);
+        // Light of another stream, or of another host, has epochs of its own. What is shared goes on whoever comes.
+        let goes_on = is_same || arrival.shares;
+        self.counts.joined += 1;
+        let admission = Admission { role, rung, held: hello.held.filter(|_| goes_on), goes_on };
+        Ok(self.welcome(id, admission, &arrival, now_us))
+    }
+
+    /// Connects a viewer that is known, and tells it so.
+    fn welcome(&mut self, id: u64, admission: Admission, arrival: &Arrival, now_us: u64) -> Link {
+        let Admission { role, rung, held, goes_on } = admission;
+        let viewer = self.viewers.get_mut(&id).expect("whoever is admitted has a place");
+        viewer.connect(role, rung, held, arrival, now_us);
         viewer.tell(&FromHost::Welcome(Welcome {
             protocol: PROTOCOL,
             viewer: id,
@@ -154,13 +178,12 @@ impl Host {
             hz: self.config.hz,
             heard: viewer.events_done,
             goes_on,
-            bits_per_s,
+            bits_per_s: self.config.rungs[rung],
             events_per_s: self.config.events_per_s,
             clock_us: now_us,
             unix_us: arrival.unix_us,
         }));
-        self.counts.joined += 1;
-        Ok(Link { viewer: id, connection: viewer.connection })
+        Link { viewer: id, connection: viewer.connection }
     }
 
     /// Makes room by forgetting who left first.
@@ -287,8 +310,10 @@ impl Host {
 
     /// The connection has ended, for whatever reason.
     pub fn leave(&mut self, link: Link, now_us: u64) {
-        if let Some(viewer) = connected(&mut self.viewers, link) {
-            viewer.left_us = Some(now_us);
+        let Some(viewer) = connected(&mut self.viewers, link) else { return };
+        viewer.left_us = Some(now_us);
+        if viewer.is_observer {
+            self.viewers.remove(&link.viewer);
         }
     }
 
@@ -308,7 +333,9 @@ impl Host {
             self.counts.bytes += text.len() as u64;
             return Next::Send(Outgoing::Text(text));
         }
-        if let Some(message) = self.state.news(viewer.state_sent) {
+        if viewer.is_told_state()
+            && let Some(message) = self.state.news(viewer.state_sent)
+        {
             viewer.state_sent = self.state.version();
             self.counts.bytes += message.len() as u64;
             return Next::Send(Outgoing::Text(message));
@@ -328,7 +355,7 @@ impl Host {
         self.viewers.retain(|_, viewer| {
             viewer.left_us.is_none_or(|left_us| now_us.saturating_sub(left_us) <= resume_us)
         });
-        for viewer in self.viewers.values_mut().filter(|viewer| viewer.left_us.is_none()) {
+        for viewer in self.viewers.values_mut().filter(|viewer| viewer.is_here()) {
             if now_us.saturating_sub(viewer.last_message_us) > silence_us && viewer.expelled.is_none() {
                 self.counts.expelled += 1;
                 let message = format!("no message for {} s", silence_us / 1_000_000);
@@ -391,16 +418,16 @@ impl Host {
     /// Ends a step: who has nothing else to hear learns that the light is still right.
     pub fn end_step(&mut self, tick: &Tick, made_us: u64, mut status: crate::Status) {
         self.tick = tick.head(made_us).messages(&[]).pop();
-        status.viewers = self.viewers.values().filter(|viewer| viewer.left_us.is_none()).count() as u32;
+        status.viewers = self.viewers.values().filter(|viewer| viewer.is_here()).count() as u32;
         status.step_us = made_us.saturating_sub(tick.stamp_us);
         for viewer in self.viewers.values_mut().filter(|viewer| viewer.left_us.is_none()) {
             viewer.tell_status(&status, made_us);
         }
     }
 
-    /// How many viewers a rung has now.
-    pub fn rung_viewers(&self, rung: usize) -> usize {
-        self.viewers.values().filter(|viewer| viewer.left_us.is_none() && viewer.rung == rung).count()
+    /// Whether somebody takes the light of a rung now.
+    pub fn is_watched(&self, rung: usize) -> bool {
+        self.shared[rung] || self.viewers.values().any(|viewer| viewer.takes_light() && viewer.rung == rung)
     }
 
     /// The cameras of viewers, at most so many: where there are more, others each time.
@@ -408,7 +435,7 @@ impl Host {
         let all: Vec<LookCamera> = self
             .viewers
             .values()
-            .filter(|viewer| viewer.left_us.is_none())
+            .filter(|viewer| viewer.is_here())
             .filter_map(|viewer| viewer.camera)
             .collect();
         if all.len() <= most {
@@ -420,7 +447,7 @@ impl Host {
 
     /// What has happened since the start.
     pub fn counts(&self) -> HostCounts {
-        let viewers = self.viewers.values().filter(|viewer| viewer.left_us.is_none()).count() as u32;
+        let viewers = self.viewers.values().filter(|viewer| viewer.is_here()).count() as u32;
         HostCounts { viewers, ..self.counts.clone() }
     }
 

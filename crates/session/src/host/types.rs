@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dapple_scene::Edits;
 
 use super::Access;
-use crate::{LightHead, Refusal};
+use crate::{Held, LightHead, Refusal};
 
 /// Settings of a host.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,8 +68,33 @@ pub struct Arrival {
     pub is_reliable: bool,
     /// Whether it comes from a page of somebody else's: without a token it may look at most.
     pub is_foreign: bool,
+    /// Whether it gets light and the scene's state from what all share (see [`super::Host::next_shared`]): then this connection carries only what is
+    /// said to it alone.
+    pub shares: bool,
     /// Microseconds since 1970.
     pub unix_us: u64,
+}
+
+/// Light for all who share a stream.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SharedLight {
+    /// What is held after it.
+    pub held: Held,
+    /// The messages that carry it.
+    pub messages: Vec<Arc<[u8]>>,
+}
+
+/// What comes next in a stream that is shared.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Shared {
+    /// Nothing: what was given out last is the newest.
+    UpToDate,
+    /// Nothing yet: a snapshot is made with the next step.
+    Wait,
+    /// What builds on that which was given out last.
+    Delta(SharedLight),
+    /// What stands by itself.
+    Snapshot(SharedLight),
 }
 
 /// A message to be sent.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::bucket::Bucket;
 use super::ladder::{Entry, Rung, Step};
-use super::{HostConfig, HostCounts};
+use super::{Arrival, HostConfig, HostCounts};
 use crate::{FromHost, Held, Look, LookCamera, Reason, Refusal, Role, Status};
 
 /// Most texts that wait to be sent; a viewer that lets more pile up is let go.
@@ -28,6 +28,10 @@ const REPAIR_EVERY_US: u64 = 250_000;
 
 pub(super) struct Viewer {
     pub(super) key: String,
+    /// It stands for all who share the state, and is no viewer itself.
+    pub(super) is_observer: bool,
+    /// Light, and the state unless it is an observer, come to it otherwise.
+    shares: bool,
     pub(super) role: Role,
     pub(super) connection: u32,
     pub(super) left_us: Option<u64>,
@@ -81,6 +85,8 @@ impl Viewer {
     pub(super) fn new(key: String, config: &HostConfig, now_us: u64) -> Viewer {
         Viewer {
             key,
+            is_observer: false,
+            shares: false,
             role: Role::View,
             connection: 0,
             left_us: None,
@@ -110,9 +116,11 @@ impl Viewer {
         role: Role,
         rung: usize,
         held: Option<Held>,
-        is_reliable: bool,
+        arrival: &Arrival,
         now_us: u64,
     ) {
+        let is_reliable = arrival.is_reliable;
+        self.shares = arrival.shares;
         self.connection = self.connection.wrapping_add(1);
         (self.role, self.rung, self.left_us, self.expelled) = (role, rung, None, None);
         (self.last_message_us, self.state_sent) = (now_us, 0);
@@ -124,6 +132,21 @@ impl Viewer {
         // What was taken and not dealt with yet still will be.
         self.events_told = self.events_done;
         self.light = Sent { held, is_reliable, last_us: now_us, progress_us: now_us, ..Sent::default() };
+    }
+
+    /// Whether it is connected, and counts as one who is.
+    pub(super) fn is_here(&self) -> bool {
+        self.left_us.is_none() && !self.is_observer
+    }
+
+    /// Whether light is sent over its connection.
+    pub(super) fn takes_light(&self) -> bool {
+        self.left_us.is_none() && !self.shares
+    }
+
+    /// Whether the scene's state is told over its connection.
+    pub(super) fn is_told_state(&self) -> bool {
+        self.is_observer || !self.shares
     }
 
     /// Lets it go: its connection learns why when it asks what to do next.
@@ -216,6 +239,9 @@ impl Viewer {
         config: &HostConfig,
         now_us: u64,
     ) -> Option<Arc<[u8]>> {
+        if self.shares {
+            return None;
+        }
         let light = &mut self.light;
         if let Some((entry, next)) = &mut light.sending {
             let message = entry.messages[*next].clone();

@@ -120,6 +120,12 @@ impl Drill {
         self.publisher.publish(&self.store);
     }
 
+    /// Lets time pass until the next update, and makes it.
+    pub(super) fn step(&mut self) {
+        self.now_us += TICK_US;
+        self.tick();
+    }
+
     pub(super) fn run(&mut self, seconds: f64) {
         let until_us = self.now_us + (seconds * 1e6) as u64;
         while self.now_us < until_us {
@@ -194,7 +200,7 @@ impl Drill {
                 self.host.leave(link, host_us);
             }
             let key = format!("{:032x}", self.random.bits());
-            let arrival = Arrival { key, is_reliable: peer.is_ordered, is_foreign: false, unix_us: 0 };
+            let arrival = Arrival { key, is_reliable: peer.is_ordered, is_foreign: false, shares: false, unix_us: 0 };
             match self.host.join(&hello, arrival, host_us) {
                 Ok(link) => peer.link = Some(link),
                 Err(refusal) => peer.refused.push(refusal),

@@ -22,7 +22,7 @@ fn hello(scene: &Scene) -> Hello {
 }
 
 fn arrival(number: u64) -> Arrival {
-    Arrival { key: format!("{number:032x}"), is_reliable: true, is_foreign: false, unix_us: 0 }
+    Arrival { key: format!("{number:032x}"), is_reliable: true, is_foreign: false, shares: false, unix_us: 0 }
 }
 
 fn join(host: &mut Host, hello: &Hello, number: u64) -> Result<Link, Reason> {

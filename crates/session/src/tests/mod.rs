@@ -2,6 +2,7 @@
 
 mod drill;
 mod drills;
+mod groups;
 mod hostile;
 mod link;
 mod messages;
