@@ -26,6 +26,8 @@ mod tests;
 pub mod work;
 
 pub use clock::SceneClock;
+/// Version of the frames of light.
+pub use dapple_stream::codec::VERSION as WIRE;
 pub use guest::{Guest, GuestConfig, GuestError, News};
 pub use light::{Assembled, Assembly, CHUNK_BYTES, LightHead, MAX_LIGHT_MESSAGE_BYTES};
 pub use message::{

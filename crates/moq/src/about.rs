@@ -1,0 +1,55 @@
+//! What all may know of a host before they take anything else.
+
+use serde::{Deserialize, Serialize};
+
+use crate::LinkError;
+
+/// Longest text of it, bytes.
+pub(crate) const MAX_ABOUT_BYTES: usize = 16 << 10;
+
+/// Most streams.
+const MAX_STREAMS: usize = 8;
+
+/// The one frame of the track `about`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct About {
+    /// Version of the conversation.
+    pub protocol: u32,
+    /// Version of the frames of light.
+    pub wire: u8,
+    /// The scene's hash, 64 hexadecimal digits.
+    pub scene: String,
+    /// Streams of the same light, from the richest to the leanest: stream K is in `light/K` and `snapshot/K`.
+    pub streams: Vec<Stream>,
+}
+
+/// A stream of light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Stream {
+    /// Most bits in any second; absent without a budget.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub bits_per_s: Option<u64>,
+}
+
+impl About {
+    pub(crate) fn parse(text: &str) -> Result<About, LinkError> {
+        let about: About = serde_json::from_str(text)
+            .map_err(|error| LinkError::Refused(format!("what the host says of itself: {error}")))?;
+        if about.streams.is_empty() || about.streams.len() > MAX_STREAMS {
+            return Err(LinkError::Refused(format!("the host offers {} streams", about.streams.len())));
+        }
+        Ok(about)
+    }
+
+    #[cfg(feature = "host")]
+    pub(crate) fn to_text(&self) -> String {
+        serde_json::to_string(self).expect("numbers and texts are JSON")
+    }
+
+    /// The richest stream within a wish, or else the leanest.
+    pub(crate) fn stream_for(&self, bits_per_s: Option<u64>) -> usize {
+        let Some(wish) = bits_per_s else { return 0 };
+        let within = |stream: &Stream| stream.bits_per_s.is_some_and(|bits| bits <= wish);
+        self.streams.iter().position(within).unwrap_or(self.streams.len() - 1)
+    }
+}

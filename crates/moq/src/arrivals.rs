@@ -1,0 +1,134 @@
+//! The host's end: viewers that want to be heard.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use dapple_session::MAX_FROM_VIEWER_BYTES;
+use futures_util::future::{Either, select};
+use moq_net::{announce, broadcast, origin, track};
+
+use crate::names::{LOOKS, TALK, is_viewer};
+use crate::pump::{Messages, Pump};
+use crate::texts::{Texts, read, subscription, text};
+use crate::viewer::Words;
+use crate::{LinkError, Message, Names};
+
+/// Viewers as they come, wherever they are connected.
+pub struct Arrivals {
+    origin: origin::Producer,
+    consumer: origin::Consumer,
+    announced: announce::Consumer,
+    names: Names,
+    here: BTreeSet<String>,
+}
+
+impl Arrivals {
+    /// Of a host with these names.
+    ///
+    /// # Errors
+    /// The origin does not allow it.
+    pub fn new(origin: &origin::Producer, names: &Names) -> Result<Arrivals, LinkError> {
+        let consumer = origin.consume().scope("", &names.writable()?)?;
+        let announced = consumer.announced();
+        Ok(Arrivals { origin: origin.clone(), consumer, announced, names: names.clone(), here: BTreeSet::new() })
+    }
+
+    /// The next viewer: where to say something to it, and what it says. `None` once the origin has ended.
+    pub async fn next(&mut self) -> Option<(HostOut, HostIn)> {
+        loop {
+            let update = self.announced.next().await?;
+            let path = update.prefix.as_str().to_owned();
+            let name = path.rsplit('/').next().unwrap_or_default().to_owned();
+            if !update.kind.is_active() {
+                self.here.remove(&name);
+                continue;
+            }
+            if !is_viewer(&name) || path != self.names.from_viewer(&name) || !self.here.insert(name.clone()) {
+                continue;
+            }
+            match HostOut::new(&self.origin, &self.names.to_viewer(&name)) {
+                Ok(out) => return Some((out, HostIn::new(self.consumer.clone(), path))),
+                Err(error) => tracing::debug!("a viewer cannot be answered: {error}"),
+            }
+        }
+    }
+}
+
+/// Says something to one viewer.
+pub struct HostOut {
+    broadcast: broadcast::Producer,
+    words: Words,
+}
+
+impl HostOut {
+    fn new(origin: &origin::Producer, path: &str) -> Result<HostOut, LinkError> {
+        let broadcast = origin.create_broadcast(path)?;
+        let words = Words::new(broadcast.create_track(TALK, None)?);
+        broadcast.announce(origin::Route::default())?;
+        Ok(HostOut { broadcast, words })
+    }
+
+    /// Sends a text. It waits here for who is slow, a bounded number of texts.
+    ///
+    /// # Errors
+    /// The viewer is gone.
+    pub fn send(&mut self, text: Arc<str>) -> Result<(), LinkError> {
+        self.words.write(&text, false)
+    }
+
+    /// Ends it in order.
+    pub fn close(&mut self) {
+        self.words.end();
+        self.broadcast.close();
+    }
+}
+
+/// What one viewer says.
+pub struct HostIn(Pump);
+
+impl HostIn {
+    fn new(consumer: origin::Consumer, path: String) -> HostIn {
+        HostIn(Pump::new(move |messages| {
+            Box::pin(async move {
+                let broadcast = consumer.request_broadcast(path.as_str()).await?;
+                // A hello must be heard, whenever it was said.
+                let talk = subscription().with_max_age(std::time::Duration::from_secs(10));
+                let talk = broadcast.track(TALK)?.subscribe(talk).await?;
+                let looks = broadcast.track(LOOKS)?.subscribe(subscription()).await?;
+                let (talk, looks) = (hear(talk, messages.clone()), look(looks, messages));
+                match select(Box::pin(talk), Box::pin(looks)).await {
+                    Either::Left((ended, _)) | Either::Right((ended, _)) => ended,
+                }
+            })
+        }))
+    }
+
+    /// The next message; `None` once it has gone.
+    ///
+    /// # Errors
+    /// It broke a rule, or its connection broke.
+    pub async fn receive(&mut self) -> Result<Option<Message>, LinkError> {
+        self.0.next().await
+    }
+}
+
+async fn hear(talk: track::Subscriber, mut messages: Messages) -> Result<(), LinkError> {
+    let mut texts = Texts::new(talk, MAX_FROM_VIEWER_BYTES);
+    while let Some((text, _)) = texts.next().await? {
+        messages.put(Message::Text(text)).await?;
+    }
+    Ok(())
+}
+
+/// One look a group: those that were overtaken need not come.
+async fn look(mut looks: track::Subscriber, mut messages: Messages) -> Result<(), LinkError> {
+    while let Some(mut group) = looks.recv_group().await? {
+        match read(&mut group, MAX_FROM_VIEWER_BYTES).await {
+            Ok(Some(bytes)) => messages.put(Message::Text(text(bytes)?)).await?,
+            Ok(None) | Err(LinkError::Ended(_)) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+

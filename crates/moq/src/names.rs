@@ -1,0 +1,114 @@
+//! What broadcasts and tracks are called.
+
+use moq_net::{Pattern, Patterns};
+
+use crate::LinkError;
+
+/// What all may know of a host.
+pub(crate) const ABOUT: &str = "about";
+/// The scene's state.
+pub(crate) const STATE: &str = "state";
+/// Words, either way.
+pub(crate) const TALK: &str = "talk";
+/// How a viewer looks: the newest counts.
+pub(crate) const LOOKS: &str = "looks";
+
+/// Longest name of a viewer.
+const MAX_VIEWER: usize = 64;
+
+/// Longest name of a broadcast, bytes.
+const MAX_NAME: usize = 200;
+
+/// The track of a rung's light.
+pub(crate) fn light(rung: usize) -> String {
+    format!("light/{rung}")
+}
+
+/// The track of its snapshots.
+pub(crate) fn snapshot(rung: usize) -> String {
+    format!("snapshot/{rung}")
+}
+
+/// Names of one host's broadcasts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Names {
+    base: String,
+}
+
+/// Says what is wrong with a broadcast's name, if anything is: parts of letters, digits, `.`, `_` and `-` with `/` between, 200 bytes at most.
+///
+/// # Errors
+/// What is wrong.
+pub fn check_name(name: &str) -> Result<(), String> {
+    let is_good = |part: &str| {
+        !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"._-".contains(&byte))
+    };
+    if name.len() > MAX_NAME || name.split('/').count() > 16 || !name.split('/').all(is_good) {
+        return Err(format!(
+            "{name:?} is no name of a broadcast: letters, digits, '.', '_' and '-', with '/' between parts"
+        ));
+    }
+    Ok(())
+}
+
+impl Names {
+    /// Of a host whose broadcast is called this ([`check_name`]).
+    ///
+    /// # Errors
+    /// What is wrong with the name.
+    pub fn new(name: &str) -> Result<Names, LinkError> {
+        check_name(name).map_err(LinkError::Refused)?;
+        Ok(Names { base: name.to_owned() })
+    }
+
+    /// The broadcast of light and state.
+    pub fn shared(&self) -> &str {
+        &self.base
+    }
+
+    /// Where viewers' broadcasts are.
+    pub fn inbox(&self) -> String {
+        format!("{}/in", self.base)
+    }
+
+    /// What a viewer says.
+    pub fn from_viewer(&self, viewer: &str) -> String {
+        format!("{}/in/{viewer}", self.base)
+    }
+
+    /// What is said to it.
+    pub fn to_viewer(&self, viewer: &str) -> String {
+        format!("{}/out/{viewer}", self.base)
+    }
+
+    /// What viewers may read who are connected to the host itself: not each other's words. The names of what is said to them are secrets.
+    ///
+    /// # Errors
+    /// None, for names that were checked.
+    pub fn readable(&self) -> Result<Patterns, LinkError> {
+        patterns(&[self.base.clone(), format!("{}/out/*", self.base)])
+    }
+
+    /// What viewers may write who are connected to the host itself.
+    ///
+    /// # Errors
+    /// None, for names that were checked.
+    pub fn writable(&self) -> Result<Patterns, LinkError> {
+        patterns(&[format!("{}/in/*", self.base)])
+    }
+}
+
+fn patterns(texts: &[String]) -> Result<Patterns, LinkError> {
+    let mut patterns = Patterns::new();
+    for text in texts {
+        let pattern: Pattern =
+            text.parse().map_err(|error| LinkError::Refused(format!("{text}: {error}")))?;
+        patterns.insert(pattern);
+    }
+    Ok(patterns)
+}
+
+/// Whether this can be a viewer's name: hexadecimal digits, 32 to 64 of them, so that nobody guesses it.
+pub(crate) fn is_viewer(name: &str) -> bool {
+    (32..=MAX_VIEWER).contains(&name.len()) && name.bytes().all(|byte| byte.is_ascii_hexdigit())
+}

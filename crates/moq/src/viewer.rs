@@ -1,0 +1,314 @@
+//! The viewer's end: takes what all share, and says what it has to say.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use dapple_session::{FromHost, FromViewer, MAX_FROM_HOST_BYTES, MAX_LIGHT_MESSAGE_BYTES, Reason, Refusal};
+use futures_channel::oneshot;
+use futures_util::future::{Either, select, try_join};
+use moq_net::{Timestamp, broadcast, group, origin, track};
+
+use crate::about::MAX_ABOUT_BYTES;
+use crate::names::{ABOUT, LOOKS, STATE, TALK, light, snapshot};
+use crate::pump::{Messages, Pump};
+use crate::texts::{Texts, read, subscription};
+use crate::{About, LinkError, Message, Names};
+
+/// Most messages of a group of words.
+const MAX_WORDS: usize = 64;
+
+/// What a viewer has, and what it wants.
+#[derive(Clone, Debug, Default)]
+pub struct Wish {
+    /// The hash of the scene that it has loaded, 64 hexadecimal digits.
+    pub scene: String,
+    /// Most bits of light a second; `None`: as many as there are.
+    pub bits_per_s: Option<u64>,
+    /// Its name, 32 to 64 hexadecimal digits that nobody can guess.
+    pub viewer: String,
+}
+
+/// Finds a host and what it says of itself: `from` is what the connection brings, and what is written to `to` must go out by it. Waits until the host is
+/// there.
+///
+/// # Errors
+/// The connection has ended, or what is there is no host.
+pub async fn join(
+    from: &origin::Consumer,
+    to: &origin::Producer,
+    names: &Names,
+    wish: &Wish,
+) -> Result<(ViewerOut, ViewerIn), LinkError> {
+    if !crate::names::is_viewer(&wish.viewer) {
+        return Err(LinkError::Refused(format!("{:?} is no name of a viewer", wish.viewer)));
+    }
+    let shared = from.routed_broadcast(names.shared()).await?;
+    let mut about = Texts::new(shared.track(ABOUT)?.subscribe(subscription()).await?, MAX_ABOUT_BYTES);
+    let Some((text, _)) = about.next().await? else {
+        return Err(LinkError::Ended("the host has ended".to_owned()));
+    };
+    let about = About::parse(&text)?;
+    let own = to.create_broadcast(names.from_viewer(&wish.viewer).as_str())?;
+    let out = ViewerOut {
+        talk: Words::new(own.create_track(TALK, None)?),
+        looks: own.create_track(LOOKS, None)?,
+        lost: Arc::default(),
+        broadcast: own,
+    };
+    out.broadcast.announce(origin::Route::default())?;
+    let reading = Reader {
+        from: from.clone(),
+        to_viewer: names.to_viewer(&wish.viewer),
+        refusal: refusal(&about, wish),
+        rung: about.stream_for(wish.bits_per_s),
+        shared,
+        lost: out.lost.clone(),
+    };
+    Ok((out, ViewerIn(Pump::new(|messages| Box::pin(reading.run(messages))))))
+}
+
+/// What makes it of no use to go on, said as the host would.
+fn refusal(about: &About, wish: &Wish) -> Option<Refusal> {
+    let (protocol, wire) = (dapple_session::PROTOCOL, dapple_session::WIRE);
+    if about.protocol != protocol || about.wire != wire {
+        let message = format!(
+            "the host speaks protocol {} with frames of version {}, this viewer {protocol} and {wire}: reload the page, or use a viewer of \
+             the host's own version",
+            about.protocol, about.wire
+        );
+        return Some(Refusal { reason: Reason::Version, message });
+    }
+    if !about.scene.eq_ignore_ascii_case(&wish.scene) {
+        let message = format!(
+            "the viewer has loaded scene {:.16}, this host lights {:.16}: fetch the scene anew",
+            wish.scene, about.scene
+        );
+        return Some(Refusal { reason: Reason::Scene, message });
+    }
+    None
+}
+
+/// Says what a viewer has to say.
+pub struct ViewerOut {
+    talk: Words,
+    looks: track::Producer,
+    /// Breaks that it told of.
+    lost: Arc<AtomicU32>,
+    /// It is gone with this.
+    broadcast: broadcast::Producer,
+}
+
+impl ViewerOut {
+    /// Says a text of a `dapple_session::Guest`.
+    ///
+    /// # Errors
+    /// The connection has ended.
+    pub fn send(&mut self, text: &str) -> Result<(), LinkError> {
+        match FromViewer::parse(text) {
+            Ok(FromViewer::Look(look)) => {
+                self.lost.store(look.lost, Ordering::Relaxed);
+                let mut group = self.looks.append_group()?;
+                group.write_frame(Timestamp::now(), text.to_owned())?;
+                Ok(group.finish()?)
+            }
+            Ok(FromViewer::Hello(_)) => self.talk.write(text, true),
+            _ => self.talk.write(text, false),
+        }
+    }
+
+    /// Ends it in order.
+    pub fn close(&mut self) {
+        self.talk.end();
+        self.broadcast.close();
+    }
+}
+
+/// A track of words. Each group of a viewer's begins with its hello, so that whoever has missed one knows who speaks.
+pub(crate) struct Words {
+    track: track::Producer,
+    group: Option<group::Producer>,
+    first: Option<String>,
+    written: usize,
+}
+
+impl Words {
+    pub(crate) fn new(track: track::Producer) -> Words {
+        Words { track, group: None, first: None, written: 0 }
+    }
+
+    pub(crate) fn write(&mut self, text: &str, is_first: bool) -> Result<(), LinkError> {
+        if is_first {
+            self.first = Some(text.to_owned());
+        }
+        if self.written >= MAX_WORDS {
+            self.end();
+        }
+        let is_new = self.group.is_none();
+        if is_new {
+            (self.group, self.written) = (Some(self.track.append_group()?), 0);
+        }
+        let Some(group) = &mut self.group else { return Ok(()) };
+        if let Some(first) = self.first.as_ref().filter(|_| is_new && !is_first) {
+            group.write_frame(Timestamp::now(), first.clone())?;
+        }
+        self.written += 1;
+        Ok(group.write_frame(Timestamp::now(), text.to_owned())?)
+    }
+
+    pub(crate) fn end(&mut self) {
+        if let Some(group) = self.group.take() {
+            // If it cannot be ended, the track is gone already.
+            let _ = group.finish();
+        }
+    }
+}
+
+/// What comes for a viewer.
+pub struct ViewerIn(Pump);
+
+impl ViewerIn {
+    /// The next message for a `dapple_session::Guest`; `None` once the host has ended.
+    ///
+    /// # Errors
+    /// The connection broke, or something came that breaks a rule.
+    pub async fn receive(&mut self) -> Result<Option<Message>, LinkError> {
+        self.0.next().await
+    }
+}
+
+struct Reader {
+    from: origin::Consumer,
+    to_viewer: String,
+    refusal: Option<Refusal>,
+    rung: usize,
+    shared: broadcast::Consumer,
+    lost: Arc<AtomicU32>,
+}
+
+impl Reader {
+    async fn run(self, mut messages: Messages) -> Result<(), LinkError> {
+        if let Some(refusal) = self.refusal {
+            return messages.put(Message::Text(FromHost::Refused(refusal).to_text())).await;
+        }
+        let (welcomed, is_welcome) = oneshot::channel();
+        let state = state(&self.shared, messages.clone(), welcomed);
+        let light = Light::read(&self.shared, self.rung, &self.lost, messages.clone());
+        let words = words(&self.from, &self.to_viewer, messages, is_welcome);
+        let shared = Box::pin(try_join(state, light));
+        match select(shared, Box::pin(words)).await {
+            Either::Left((ended, _)) => ended.map(|_| ()),
+            Either::Right((ended, _)) => ended,
+        }
+    }
+}
+
+/// The state, and before it a welcome for all: to look.
+async fn state(
+    shared: &broadcast::Consumer,
+    mut messages: Messages,
+    welcomed: oneshot::Sender<()>,
+) -> Result<(), LinkError> {
+    let mut texts = Texts::new(shared.track(STATE)?.subscribe(subscription()).await?, MAX_FROM_HOST_BYTES);
+    let mut welcomed = Some(welcomed);
+    while let Some((text, is_first)) = texts.next().await? {
+        // Later groups begin with a welcome too, for those who come then.
+        if is_first && welcomed.is_none() {
+            continue;
+        }
+        messages.put(Message::Text(text)).await?;
+        if let Some(welcomed) = welcomed.take() {
+            let _ = welcomed.send(());
+        }
+    }
+    Ok(())
+}
+
+/// What is said to this viewer alone, once it was welcomed as one of all.
+async fn words(
+    from: &origin::Consumer,
+    path: &str,
+    mut messages: Messages,
+    is_welcome: oneshot::Receiver<()>,
+) -> Result<(), LinkError> {
+    let _ = is_welcome.await;
+    let broadcast = from.routed_broadcast(path).await?;
+    let talk = subscription().with_max_age(std::time::Duration::from_secs(10));
+    let mut texts = Texts::new(broadcast.track(TALK)?.subscribe(talk).await?, MAX_FROM_HOST_BYTES);
+    while let Some((text, _)) = texts.next().await? {
+        if let Ok(FromHost::Refused(refusal)) = FromHost::parse(&text)
+            && refusal.reason == Reason::Full
+        {
+            // There is no place among those who are heard: it looks on.
+            tracing::info!("{}: looking on", refusal.message);
+            return std::future::pending().await;
+        }
+        messages.put(Message::Text(text)).await?;
+    }
+    Err(LinkError::Ended("the host hears this viewer no more".to_owned()))
+}
+
+/// A stream of light, group after group.
+struct Light {
+    track: track::Consumer,
+    snapshots: track::Consumer,
+    messages: Messages,
+    /// The group that was read last, and whether all of it was.
+    last: Option<(u64, bool)>,
+}
+
+impl Light {
+    async fn read(
+        shared: &broadcast::Consumer,
+        rung: usize,
+        lost: &AtomicU32,
+        messages: Messages,
+    ) -> Result<(), LinkError> {
+        let (track, snapshots) = (shared.track(&light(rung))?, shared.track(&snapshot(rung))?);
+        let mut groups = track.subscribe(subscription()).await?.ordered();
+        let mut light = Light { track, snapshots, messages, last: None };
+        while let Some(mut group) = groups.next_group().await? {
+            let sequence = group.sequence;
+            let follows = light.last.is_some_and(|(last, is_whole)| is_whole && last + 1 == sequence);
+            if !follows {
+                light.snapshot(sequence).await?;
+            }
+            let is_whole = light.group(&mut group, sequence, lost).await?;
+            light.last = Some((sequence, is_whole));
+        }
+        Ok(())
+    }
+
+    /// What a group builds on.
+    async fn snapshot(&mut self, sequence: u64) -> Result<(), LinkError> {
+        let mut group = self.snapshots.fetch_group(sequence, None).await?;
+        while let Some(bytes) = read(&mut group, MAX_LIGHT_MESSAGE_BYTES).await? {
+            self.messages.put(Message::Bytes(bytes)).await?;
+        }
+        Ok(())
+    }
+
+    /// All of a group; false if it was cut off. When the viewer finds that something does not fit, it gets the group again from its snapshot on.
+    async fn group(
+        &mut self,
+        group: &mut group::Consumer,
+        sequence: u64,
+        lost: &AtomicU32,
+    ) -> Result<bool, LinkError> {
+        let mut mended = lost.load(Ordering::Relaxed);
+        loop {
+            let now = lost.load(Ordering::Relaxed);
+            if now > mended {
+                tracing::debug!(sequence, "light did not fit: once more from the group's snapshot");
+                mended = now;
+                self.snapshot(sequence).await?;
+                *group = self.track.fetch_group(sequence, None).await?;
+            }
+            match read(group, MAX_LIGHT_MESSAGE_BYTES).await {
+                Ok(Some(bytes)) => self.messages.put(Message::Bytes(bytes)).await?,
+                Ok(None) => return Ok(true),
+                Err(LinkError::Ended(_)) => return Ok(false),
+                Err(error) => return Err(error),
+            }
+        }
+    }
+}
