@@ -31,8 +31,13 @@ pub fn live_session(data: &[u8]) {
         scene: hex(&scene.hash().0),
         ..Hello::default()
     };
-    let arrival =
-        |key: &str| Arrival { key: key.to_owned(), is_reliable: true, is_foreign: false, shares: false, unix_us: 0 };
+    let arrival = |key: &str| Arrival {
+        key: key.to_owned(),
+        is_reliable: true,
+        is_foreign: false,
+        shares: false,
+        unix_us: 0,
+    };
     let watcher = host.join(&hello, arrival("watcher"), 0).expect("it fits");
     let mut listener = Guest::new(scene.clone(), GuestConfig::default());
     listener.connected(0);

@@ -1,6 +1,7 @@
 //! The project's own checks: `cargo xtask ci` is the one definition of "checked".
 
 mod markdown;
+mod relay;
 mod seams;
 mod skipped;
 mod steps;
@@ -32,7 +33,9 @@ enum Task {
     Tidy,
     /// The page, into target/web, and its size.
     Wasm,
-    /// Everything: check, the page, the smoke evaluation, test.
+    /// A MoQ relay, unmodified, into target/relay: tests run sessions through it.
+    Relay,
+    /// Everything: check, the page, a relay, the smoke evaluation, test.
     Ci,
 }
 
@@ -60,6 +63,7 @@ fn run(task: Task) -> Result<()> {
         Task::Test => runner.run(&test),
         Task::Tidy => runner.run(&[Step::Tidy]),
         Task::Wasm => runner.run(&[Step::Page]),
+        Task::Relay => runner.run(&[Step::Relay]),
         Task::Ci => {
             runner.run(&check);
             // Before the tests, which open it in a browser.
@@ -67,6 +71,9 @@ fn run(task: Task) -> Result<()> {
                 runner.run(&[Step::Page]);
             } else {
                 runner.skip("skipped: the page, Rust cannot compile for browsers here");
+            }
+            if let Err(error) = relay::install(runner.target()) {
+                runner.skip(&format!("skipped: sessions through relays, {error:#}"));
             }
             runner.run(&[Step::Smoke]);
             runner.run(&test);

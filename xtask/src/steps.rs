@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, bail};
 use cargo_metadata::Metadata;
 
-use crate::{seams, skipped, tidy, wasm};
+use crate::{relay, seams, skipped, tidy, wasm};
 
 /// One thing that can pass or fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,6 +23,8 @@ pub(crate) enum Step {
     Tidy,
     /// The page, with what its tests need.
     Page,
+    /// See [`relay`].
+    Relay,
     /// The whole loop on a small scene, by the command itself.
     Smoke,
     /// Documentation examples.
@@ -40,6 +42,7 @@ impl Step {
             Step::Seams => "seams",
             Step::Tidy => "tidy",
             Step::Page => "page",
+            Step::Relay => "relay",
             Step::Smoke => "smoke evaluation",
             Step::DocTests => "documentation examples",
             Step::Tests => "tests",
@@ -117,6 +120,7 @@ impl Runner {
             Step::Seams => seams::check(&self.metadata),
             Step::Tidy => tidy::check(self.root()),
             Step::Page => self.page(),
+            Step::Relay => relay::install(self.target()),
             Step::Smoke => self.smoke(),
             Step::DocTests => self.cargo(&["test", "--doc", "--workspace", "--all-features"]),
             Step::Tests => self.tests(),
@@ -176,6 +180,11 @@ impl Runner {
             Err(error) => eprintln!("cannot list what was skipped: {}: {error}", report.display()),
         }
         outcome
+    }
+
+    /// Where what is built lies.
+    pub(crate) fn target(&self) -> &Path {
+        self.metadata.target_directory.as_std_path()
     }
 
     fn root(&self) -> &Path {

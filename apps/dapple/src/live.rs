@@ -3,10 +3,14 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use anyhow::{Context, Result, bail};
 use dapple_session::{Guest, GuestError, News};
 use tokio::sync::watch;
 
-use crate::transport::{Inbound, Message, Outbound, ws};
+use crate::page::MoqJson;
+#[cfg(feature = "moq")]
+use crate::transport::moq;
+use crate::transport::{Inbound, LinkError, Message, Outbound, ws};
 
 /// What waits to be said is looked for this often, besides after each message.
 const LOOK_FOR_WORDS: Duration = Duration::from_millis(50);
@@ -26,6 +30,35 @@ pub(crate) enum LinkState {
     Waiting(String, f64),
     /// It is of no use to try again, and why.
     Ended(String),
+}
+
+/// Where a session is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Address {
+    /// At `ws://…`.
+    Ws(String),
+    /// Over MoQ, directly or through a relay.
+    Moq(MoqJson),
+}
+
+impl Address {
+    /// The session that a folder's viewer.json names; over MoQ if that is wanted: at a relay's address, or (an empty one) where the folder says.
+    pub(crate) fn choose(
+        live: Option<String>,
+        moq: Option<MoqJson>,
+        relay: Option<&str>,
+    ) -> Result<Option<Address>> {
+        let Some(relay) = relay else { return Ok(live.map(Address::Ws)) };
+        if cfg!(not(feature = "moq")) {
+            bail!("--moq: this program was built without MoQ: cargo build --release --features moq");
+        }
+        let moq = moq.context("--moq: what is served there is not served over MoQ (dapple serve --moq)")?;
+        Ok(Some(Address::Moq(match relay {
+            "" => moq,
+            // A relay has a certificate of its own.
+            url => MoqJson { url: url.to_owned(), certificate: None, ..moq },
+        })))
+    }
 }
 
 /// A guest that a task and others share.
@@ -49,9 +82,9 @@ impl SharedGuest {
     }
 }
 
-/// Keeps up a session at `ws://…` until told to stop or refused for good. `on_news` is called with the guest as it brings news.
+/// Keeps up a session until told to stop or refused for good. `on_news` is called with the guest as it brings news.
 pub(crate) async fn keep(
-    address: &str,
+    address: &Address,
     shared: &SharedGuest,
     state: &watch::Sender<LinkState>,
     mut stop: watch::Receiver<bool>,
@@ -93,19 +126,43 @@ enum Ended {
 }
 
 async fn converse(
-    address: &str,
+    address: &Address,
+    shared: &SharedGuest,
+    state: &watch::Sender<LinkState>,
+    stop: &mut watch::Receiver<bool>,
+    on_news: &mut (impl FnMut(&mut Guest, News) + Send),
+) -> Ended {
+    match address {
+        Address::Ws(address) => {
+            let connecting = ws::connect(address, MAX_MESSAGE_BYTES);
+            converse_over(connecting, shared, state, stop, on_news).await
+        }
+        #[cfg(feature = "moq")]
+        Address::Moq(address) => {
+            let hello = shared.lock().hello();
+            let connecting = moq::connect(address, &hello);
+            converse_over(connecting, shared, state, stop, on_news).await
+        }
+        #[cfg(not(feature = "moq"))]
+        Address::Moq(_) => Ended::Refused("this program was built without MoQ".to_owned()),
+    }
+}
+
+async fn converse_over<O: Outbound, I: Inbound>(
+    connecting: impl Future<Output = Result<(O, I), LinkError>> + Send,
     shared: &SharedGuest,
     state: &watch::Sender<LinkState>,
     stop: &mut watch::Receiver<bool>,
     on_news: &mut (impl FnMut(&mut Guest, News) + Send),
 ) -> Ended {
     let connected = tokio::select! {
-        connected = ws::connect(address, MAX_MESSAGE_BYTES) => connected,
+        connected = connecting => connected,
         () = told(stop) => return Ended::Stopped,
     };
     let (mut out, mut inbound) = match connected {
         Ok(halves) => halves,
-        Err(error) => return Ended::Broken(error.to_string()),
+        Err(LinkError::Ended(reason)) => return Ended::Broken(reason),
+        Err(LinkError::Refused(reason)) => return Ended::Refused(reason),
     };
     shared.lock().connected(shared.now_us());
     let mut words = tokio::time::interval(LOOK_FOR_WORDS);

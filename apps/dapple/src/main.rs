@@ -53,6 +53,17 @@ fn log(command: &Command) {
         Command::Worker(_) => ("info", LogFormat::Text),
         _ => ("warn", LogFormat::Text),
     };
+    // What the QUIC library warns of is its everyday; this program says itself what matters of it.
+    let quiet = [
+        "moq_net",
+        "moq_noq",
+        "moq_noq_proto",
+        "moq_sock",
+        "moq_tokio",
+        "web_transport_moq",
+        "web_transport_proto",
+    ];
+    let level = quiet.iter().fold(level.to_owned(), |level, name| format!("{level},{name}=error"));
     let filter = tracing_subscriber::EnvFilter::try_from_env("DAPPLE_LOG")
         .unwrap_or_else(|_| tracing_subscriber::EnvFilter::new(level));
     let lines =

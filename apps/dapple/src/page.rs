@@ -19,12 +19,27 @@ pub(crate) struct ViewerJson {
     /// Address of a live session of it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) live: Option<String>,
+    /// Where the same session is over MoQ.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) moq: Option<MoqJson>,
     /// The animation that plays, if that is not the file's first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) animation: Option<u32>,
     /// Spare instances that the scene gets when it is loaded.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(crate) spares: Vec<Spares>,
+}
+
+/// A live session over Media over QUIC.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct MoqJson {
+    /// Address of the host itself or of a relay, `https://…`.
+    pub(crate) url: String,
+    /// The name of its broadcast.
+    pub(crate) name: String,
+    /// SHA-256 of its certificate, hexadecimal, where nobody vouches for that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) certificate: Option<String>,
 }
 
 /// So many spare instances like one.

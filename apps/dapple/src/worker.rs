@@ -33,7 +33,7 @@ pub(crate) fn run(args: &WorkerArgs) -> Result<()> {
     if args.threads > 1024 {
         bail!("--threads is {}, must be 0 (one for each core) to 1024", args.threads);
     }
-    let (scene, _) = fetch_scene(&args.connect)?;
+    let (scene, _) = fetch_scene(&args.connect, None)?;
     let scene = Arc::new(scene);
     let address = resolve(&args.connect, WORK_PATH)?.replacen("http://", "ws://", 1);
     let shard = args.shard.0;

@@ -20,17 +20,19 @@ pub struct Arrivals {
     announced: announce::Consumer,
     names: Names,
     here: BTreeSet<String>,
+    most: usize,
 }
 
 impl Arrivals {
-    /// Of a host with these names.
+    /// Of a host with these names; so many at a time, the others are not heard.
     ///
     /// # Errors
     /// The origin does not allow it.
-    pub fn new(origin: &origin::Producer, names: &Names) -> Result<Arrivals, LinkError> {
+    pub fn new(origin: &origin::Producer, names: &Names, most: usize) -> Result<Arrivals, LinkError> {
         let consumer = origin.consume().scope("", &names.writable()?)?;
         let announced = consumer.announced();
-        Ok(Arrivals { origin: origin.clone(), consumer, announced, names: names.clone(), here: BTreeSet::new() })
+        let (origin, names, here) = (origin.clone(), names.clone(), BTreeSet::new());
+        Ok(Arrivals { origin, consumer, announced, names, here, most })
     }
 
     /// The next viewer: where to say something to it, and what it says. `None` once the origin has ended.
@@ -43,7 +45,8 @@ impl Arrivals {
                 self.here.remove(&name);
                 continue;
             }
-            if !is_viewer(&name) || path != self.names.from_viewer(&name) || !self.here.insert(name.clone()) {
+            let is_one = is_viewer(&name) && path == self.names.from_viewer(&name);
+            if !is_one || self.here.len() >= self.most || !self.here.insert(name.clone()) {
                 continue;
             }
             match HostOut::new(&self.origin, &self.names.to_viewer(&name)) {
@@ -76,9 +79,15 @@ impl HostOut {
         self.words.write(&text, false)
     }
 
-    /// Ends it in order.
-    pub fn close(&mut self) {
-        self.words.end();
+    /// Says that this was the last. Whoever is to hear it must come for it before this is dropped.
+    pub fn finish(&mut self) {
+        self.words.finish();
+    }
+}
+
+impl Drop for HostOut {
+    fn drop(&mut self) {
+        self.words.finish();
         self.broadcast.close();
     }
 }
@@ -131,4 +140,3 @@ async fn look(mut looks: track::Subscriber, mut messages: Messages) -> Result<()
     }
     Ok(())
 }
-

@@ -17,13 +17,12 @@ const STATE_PRIORITY: u8 = 200;
 const LIGHT_PRIORITY: u8 = 150;
 const SNAPSHOT_PRIORITY: u8 = 140;
 
-/// What a host publishes.
+/// What a host publishes; it ends when this is dropped.
 pub struct Broadcast {
-    /// It ends with this.
     broadcast: broadcast::Producer,
     state: (StateGroups, Groups),
     streams: Vec<Light>,
-    _about: track::Producer,
+    about: track::Producer,
 }
 
 struct Light {
@@ -70,7 +69,12 @@ impl Broadcast {
             protocol: dapple_session::PROTOCOL,
             wire: dapple_session::WIRE,
             scene: dapple_session::host::hex(&host.scene().hash().0),
-            streams: host.config().rungs.iter().map(|bits_per_s| Stream { bits_per_s: *bits_per_s }).collect(),
+            streams: host
+                .config()
+                .rungs
+                .iter()
+                .map(|bits_per_s| Stream { bits_per_s: *bits_per_s })
+                .collect(),
         };
         let broadcast = origin.create_broadcast(names.shared())?;
         let track = |name: &str, priority: u8| {
@@ -93,7 +97,7 @@ impl Broadcast {
             .collect::<Result<Vec<_>, LinkError>>()?;
         // Who hears of it finds all of it.
         broadcast.announce(origin::Route::default())?;
-        Ok(Broadcast { broadcast, state: (StateGroups::default(), state), streams, _about: about_track })
+        Ok(Broadcast { broadcast, state: (StateGroups::default(), state), streams, about: about_track })
     }
 
     /// Writes what a step has brought; to be called after each. True once the host is being stopped and that has been said.
@@ -128,9 +132,17 @@ impl Broadcast {
     pub fn is_taken(&self) -> bool {
         self.state.1.track.is_used() || self.streams.iter().any(|stream| stream.light.track.is_used())
     }
+}
 
-    /// Ends it in order.
-    pub fn finish(self) {
+impl Drop for Broadcast {
+    fn drop(&mut self) {
+        // Whatever cannot be ended has ended already.
+        let _ = self.about.finish();
+        let _ = self.state.1.finish();
+        for stream in &mut self.streams {
+            let _ = stream.light.finish();
+            let _ = stream.snapshots.finish();
+        }
         self.broadcast.close();
     }
 }
@@ -178,6 +190,11 @@ impl Groups {
         }
         let Some(group) = &mut self.group else { return Ok(()) };
         Ok(group.write_frame(Timestamp::now(), bytes)?)
+    }
+
+    fn finish(&mut self) -> Result<(), LinkError> {
+        self.end()?;
+        Ok(self.track.finish()?)
     }
 
     fn end(&mut self) -> Result<(), LinkError> {

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use bytes::Bytes;
-use moq_net::track::{self, Subscription};
 use moq_net::group;
+use moq_net::track::{self, Subscription};
 
 use crate::LinkError;
 

@@ -118,8 +118,16 @@ impl ViewerOut {
 
     /// Ends it in order.
     pub fn close(&mut self) {
-        self.talk.end();
+        self.talk.finish();
+        // If it cannot be ended, it is gone already.
+        let _ = self.looks.finish();
         self.broadcast.close();
+    }
+}
+
+impl Drop for ViewerOut {
+    fn drop(&mut self) {
+        self.close();
     }
 }
 
@@ -155,7 +163,12 @@ impl Words {
         Ok(group.write_frame(Timestamp::now(), text.to_owned())?)
     }
 
-    pub(crate) fn end(&mut self) {
+    pub(crate) fn finish(&mut self) {
+        self.end();
+        let _ = self.track.finish();
+    }
+
+    fn end(&mut self) {
         if let Some(group) = self.group.take() {
             // If it cannot be ended, the track is gone already.
             let _ = group.finish();

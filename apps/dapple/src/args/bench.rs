@@ -53,6 +53,9 @@ pub(crate) struct ServedArgs {
     /// Updates a second.
     #[arg(long, value_name = "H", default_value_t = 20.0)]
     pub(crate) hz: f64,
+    /// Join over QUIC (MoQ), as the server says, or at a relay's address (as dapple view --moq). Needs the feature moq.
+    #[arg(long, value_name = "RELAY", num_args = 0..=1, default_missing_value = "")]
+    pub(crate) moq: Option<String>,
 }
 
 #[derive(Debug, Clone, Args)]

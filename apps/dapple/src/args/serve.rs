@@ -16,6 +16,8 @@ Examples:
   dapple serve room.glb --host 0.0.0.0 --token interact=SECRET       others in the network look; with ?token=SECRET they move things
   dapple serve room.glb --host 0.0.0.0 --tls-cert cert.pem --tls-key key.pem
   dapple serve --builtin atrium --spare boulder-0=8 --record session.dapple
+  dapple serve --builtin atrium --moq            over QUIC as well (feature moq)
+  dapple serve room.glb --relay https://relay.example/dapple?jwt=TOKEN
 
 Ctrl-C or SIGTERM ends it in order. docs/deploy.md tells of more than one machine, docs/live.md specifies the messages.";
 
@@ -75,6 +77,20 @@ pub(crate) struct ServeArgs {
     /// Their key in PEM.
     #[arg(long, value_name = "FILE.pem", requires = "tls_cert")]
     pub(crate) tls_key: Option<PathBuf>,
+    /// Serve over QUIC too (MoQ; browsers: WebTransport), at this UDP port; 0, or no number, takes any. With --tls-cert under that certificate,
+    /// otherwise under one made at the start, which viewers of viewer.json trust. Needs the feature moq.
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "0")]
+    pub(crate) moq: Option<u16>,
+    /// Publish to a MoQ relay, for viewers that it serves: https://RELAY/, with ?jwt=… where it asks for a token, or http://RELAY/ for one that tells
+    /// the hash of its certificate. More than once for more relays. Needs the feature moq.
+    #[arg(long, value_name = "URL")]
+    pub(crate) relay: Vec<String>,
+    /// Name of the MoQ broadcast [default: the scene's hash and a random part, told in viewer.json].
+    #[arg(long, value_name = "NAME")]
+    pub(crate) moq_name: Option<String>,
+    /// Address that viewer.json names for MoQ [default: this server's, with --moq; otherwise that of the first relay].
+    #[arg(long, value_name = "URL")]
+    pub(crate) moq_at: Option<String>,
     /// Folder of the built page [default: target/web].
     #[arg(long, value_name = "DIR")]
     pub(crate) page: Option<PathBuf>,

@@ -30,6 +30,10 @@ pub(crate) struct ViewArgs {
     /// What gives more rights in a live session, where its host asks for that (dapple serve --token).
     #[arg(long, value_name = "SECRET", requires = "url", env = "DAPPLE_TOKEN", hide_env_values = true)]
     pub(crate) token: Option<String>,
+    /// Join the live session over QUIC (MoQ), as --url says, or at a relay's address: https://RELAY/, or http://RELAY/ for one that tells the hash of
+    /// its certificate. Needs the feature moq.
+    #[arg(long, value_name = "RELAY", requires = "url", num_args = 0..=1, default_missing_value = "")]
+    pub(crate) moq: Option<String>,
     /// Recording to play; without it the scene is lit while it is shown.
     #[arg(long, value_name = "FILE.dapple", conflicts_with_all = ["points", "hz"])]
     pub(crate) stream: Option<PathBuf>,

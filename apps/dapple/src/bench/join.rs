@@ -11,6 +11,7 @@ use super::served::Served;
 use super::shaper;
 use super::swarm::Bot;
 use crate::args::JoinArgs;
+use crate::live::Address;
 
 /// How long one may wait.
 const TIMEOUT: Duration = Duration::from_secs(60);
@@ -52,7 +53,10 @@ async fn once(served: &Served, args: &JoinArgs) -> Result<(f64, u64, usize)> {
     let target = served.url.trim_start_matches("http://").trim_end_matches('/').to_owned();
     let round_trip = Duration::from_secs_f64(args.delay * 1e-3);
     let link = shaper::start(target.clone(), args.link.0 as f64 / 8.0, round_trip).await?;
-    let address = served.live.replace(&target, &link);
+    let Address::Ws(live) = &served.live else {
+        bail!("--moq: the link that this makes narrow is TCP; leave it out");
+    };
+    let address = Address::Ws(live.replace(&target, &link));
     let (stop, stopped) = watch::channel(false);
     let bot = Bot::new(served, GuestConfig::default(), true);
     let viewing = {

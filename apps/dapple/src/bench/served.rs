@@ -9,6 +9,7 @@ use anyhow::{Context, Result, bail};
 use dapple_scene::Scene;
 
 use crate::args::ServedArgs;
+use crate::live::Address;
 use crate::progress::Bar;
 use crate::serve::{LIGHT_THREADS, process_of, threads_of};
 use crate::view::fetch_scene;
@@ -20,18 +21,23 @@ const START_TIMEOUT: Duration = Duration::from_secs(300);
 pub(crate) struct Served {
     child: Option<Child>,
     pub(crate) url: String,
-    pub(crate) live: String,
+    pub(crate) live: Address,
     pub(crate) scene: Arc<Scene>,
 }
 
 impl Served {
     /// Starts one and waits until it has light.
     pub(crate) fn start(args: &ServedArgs, more: &[&str]) -> Result<Served> {
+        if args.moq.as_deref().is_some_and(|relay| !relay.is_empty()) {
+            bail!("--moq RELAY: name the server that publishes to the relay with --url");
+        }
+        let moq: &[&str] = if args.moq.is_some() { &["--moq"] } else { &[] };
         let program = std::env::current_exe().context("cannot find this program")?;
         let mut child = Command::new(program)
             .args(["serve", "--builtin", &args.builtin, "--detail", &args.detail.to_string()])
             .args(["--points", &args.points.to_string(), "--hz", &args.hz.to_string(), "--port", "0"])
             .args(more)
+            .args(moq)
             .env_remove("DAPPLE_TOKENS")
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
@@ -55,27 +61,28 @@ impl Served {
         };
         // What else it says must not block it.
         std::thread::spawn(move || lines.for_each(drop));
-        let served = Served::at(&url, Some(child))?;
+        let served = Served::at(&url, Some(child), args.moq.as_deref())?;
         served.wait()?;
         Ok(served)
     }
 
     /// One that runs already.
-    pub(crate) fn running(url: &str) -> Result<Served> {
-        let served = Served::at(url, None)?;
+    pub(crate) fn running(url: &str, moq: Option<&str>) -> Result<Served> {
+        let served = Served::at(url, None, moq)?;
         served.wait()?;
         Ok(served)
     }
 
     /// What is known of one, for those who view it.
-    pub(crate) fn attached(url: String, live: String, scene: Arc<Scene>) -> Served {
+    pub(crate) fn attached(url: String, live: Address, scene: Arc<Scene>) -> Served {
         Served { child: None, url, live, scene }
     }
 
-    fn at(url: &str, child: Option<Child>) -> Result<Served> {
+    fn at(url: &str, child: Option<Child>, moq: Option<&str>) -> Result<Served> {
+        let nowhere = Address::Ws(String::new());
         let mut served =
-            Served { child, url: url.to_owned(), live: String::new(), scene: Arc::new(Scene::default()) };
-        let (scene, live) = fetch_scene(url)?;
+            Served { child, url: url.to_owned(), live: nowhere, scene: Arc::new(Scene::default()) };
+        let (scene, live) = fetch_scene(url, moq)?;
         served.live = live.with_context(|| format!("{url} serves no live session"))?;
         served.scene = Arc::new(scene);
         Ok(served)

@@ -12,6 +12,7 @@ use tokio::sync::watch;
 use super::served::Served;
 use super::swarm::Bot;
 use crate::args::SoakArgs;
+use crate::live::Address;
 use crate::progress::Bar;
 
 /// Memory is watched from this part of the time on: before, caches and pools fill.
@@ -148,7 +149,7 @@ fn config(seed: u64) -> GuestConfig {
 
 /// Viewers in one place, one after the other, until the time is over. Every event of theirs is answered before they go.
 async fn live_on(
-    (address, scene, url): (String, Arc<dapple_scene::Scene>, String),
+    (address, scene, url): (Address, Arc<dapple_scene::Scene>, String),
     place: u32,
     mut random: Random,
     until: Instant,

@@ -7,7 +7,7 @@ use dapple_session::{Guest, GuestConfig, Held, News};
 use dapple_stream::{FrameHeader, Limits, Subscriber};
 use tokio::sync::watch;
 
-use crate::live::{LinkState, SharedGuest, keep};
+use crate::live::{Address, LinkState, SharedGuest, keep};
 
 use super::served::Served;
 
@@ -56,7 +56,7 @@ impl Bot {
     }
 
     /// Views until told to stop.
-    pub(crate) async fn view(&self, address: &str, stop: watch::Receiver<bool>) {
+    pub(crate) async fn view(&self, address: &Address, stop: watch::Receiver<bool>) {
         let start = Instant::now();
         keep(address, &self.shared, &self.state, stop, |guest, news| self.take(guest, news, start)).await;
     }

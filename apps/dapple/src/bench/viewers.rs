@@ -58,7 +58,7 @@ pub(crate) fn run(args: &ViewersArgs) -> Result<()> {
     let _ = rlimit::increase_nofile_limit(u64::from(most) + 256);
     let max_viewers = (most + 16).to_string();
     let served = match &args.url {
-        Some(url) => Served::running(url)?,
+        Some(url) => Served::running(url, args.served.moq.as_deref())?,
         None => Served::start(&args.served, &["--max-viewers", &max_viewers])?,
     };
     let runtime = tokio::runtime::Builder::new_multi_thread()

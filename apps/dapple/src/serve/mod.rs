@@ -10,6 +10,8 @@ mod asset;
 mod engine;
 mod figures;
 mod hub;
+#[cfg(feature = "moq")]
+mod moq;
 mod ration;
 mod recording;
 mod viewer;
@@ -35,7 +37,7 @@ use crate::args::{LightArgs, ServeArgs};
 use crate::file::{check_writable, wait_for_interrupt};
 use crate::light::server_config;
 use crate::listen::{bind, url_of};
-use crate::page::built_page;
+use crate::page::{MoqJson, built_page};
 use crate::progress::Bar;
 use asset::Asset;
 use engine::Engine;
@@ -129,9 +131,10 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
         }
         None => (None, None),
     };
-    let router = web::router(hub.clone(), asset.clone(), work, page);
     let (stop_accepting, stop) = watch::channel(false);
     let most = args.max_viewers as usize + OTHER_CONNECTIONS;
+    let moq = start_moq(args, &hub, &runtime, first_group, most)?;
+    let router = web::router(hub.clone(), asset.clone(), work, page, moq.clone());
     raise_file_limit(most as u64 + 64);
     let is_secure = tls.is_some();
     runtime.spawn(accept::accept(listener, router, tls, most, stop));
@@ -142,7 +145,7 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
         Engine { hub: hub.clone(), config, hz, ration, recording, workers, stop: stop_light.clone() };
     let engine = start(engine, args.threads)?;
     let url = url_of(address, if is_secure { "https" } else { "http" });
-    announce(&url, &asset, has_page, is_secure);
+    announce(&url, &asset, has_page, is_secure, moq.as_ref());
     if let Some(parts) = args.workers {
         say!("It waits for workers: dapple worker --connect {url} --shard 1/{parts}, to {parts}/{parts}\n");
     }
@@ -172,7 +175,34 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     light.and(ended)
 }
 
+/// Serves over MoQ where that is wanted; gives what viewers are told.
+#[cfg(feature = "moq")]
+fn start_moq(
+    args: &ServeArgs,
+    hub: &hub::SharedHub,
+    runtime: &Runtime,
+    first_group: u64,
+    most: usize,
+) -> Result<Option<MoqJson>> {
+    let scene = hub.host().scene().hash().0;
+    let Some(moq) = moq::Moq::open(args, &scene, runtime)? else { return Ok(None) };
+    let json = moq.json.clone();
+    moq.start(hub, runtime, first_group, most)?;
+    Ok(json)
+}
+
+#[cfg(not(feature = "moq"))]
+fn start_moq(args: &ServeArgs, _: &hub::SharedHub, _: &Runtime, _: u64, _: usize) -> Result<Option<MoqJson>> {
+    if args.moq.is_some() || !args.relay.is_empty() {
+        bail!("--moq, --relay: this program was built without MoQ: cargo build --release --features moq");
+    }
+    Ok(None)
+}
+
 fn check(args: &ServeArgs) -> Result<()> {
+    if args.moq.is_none() && args.relay.is_empty() && (args.moq_name.is_some() || args.moq_at.is_some()) {
+        bail!("--moq-name and --moq-at say where a session is over MoQ: it needs --moq or --relay too");
+    }
     if !(args.load > 0.0 && args.load <= 1.0) {
         bail!("--load is {}, must be above 0 to 1", args.load);
     }
@@ -258,7 +288,7 @@ fn start(engine: Engine, threads: usize) -> Result<JoinHandle<Result<()>>> {
 }
 
 /// Says where what is to be found.
-fn announce(url: &str, asset: &Asset, has_page: bool, is_secure: bool) {
+fn announce(url: &str, asset: &Asset, has_page: bool, is_secure: bool, moq: Option<&MoqJson>) {
     say!("\n{} is lit here:", asset.title);
     if has_page {
         say!("  in a browser   {url}");
@@ -267,6 +297,9 @@ fn announce(url: &str, asset: &Asset, has_page: bool, is_secure: bool) {
     }
     if !is_secure {
         say!("  in a window    dapple view --url {url}");
+    }
+    if let Some(moq) = moq {
+        say!("  over QUIC      dapple view --url {url} --moq        {} at {}", moq.name, moq.url);
     }
     say!("  figures        {url}health  {url}metrics\nCtrl-C ends it\n");
 }

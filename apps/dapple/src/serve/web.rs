@@ -17,10 +17,10 @@ use tower_http::set_header::SetResponseHeaderLayer;
 
 use super::accept::Permit;
 use super::asset::Asset;
-use super::hub::{Phase, SharedHub};
+use super::hub::{Phase, SharedHub, Whence};
 use super::viewer::talk;
 use super::work::{self, WorkHub};
-use crate::page::{FILE_NAME, Spares, ViewerJson};
+use crate::page::{FILE_NAME, MoqJson, Spares, ViewerJson};
 use crate::transport::ws;
 
 /// Where viewers connect to.
@@ -37,7 +37,16 @@ struct Shared {
     hub: SharedHub,
     asset: Arc<Asset>,
     work: Option<Arc<WorkHub>>,
-    viewer_json: Arc<str>,
+    viewer_json: ViewerJsons,
+}
+
+/// What a page's viewer.json says.
+#[derive(Clone)]
+struct ViewerJsons {
+    /// To pages of other hosts.
+    open: Arc<str>,
+    /// To its own, and to programs: the name of a session over MoQ is all that keeps others from changing the scene where there are no tokens.
+    own: Arc<str>,
 }
 
 /// Everything that is served; `page` is the built page's folder, where there is one.
@@ -46,11 +55,13 @@ pub(crate) fn router(
     asset: Arc<Asset>,
     work: Option<Arc<WorkHub>>,
     page: Option<PathBuf>,
+    moq: Option<MoqJson>,
 ) -> Router {
     let json = ViewerJson {
         scene: format!("{SCENE_FOLDER}/{}", asset.name),
         stream: None,
         live: Some(LIVE_PATH.to_owned()),
+        moq: None,
         animation: asset.scene.active_animation.filter(|index| *index != 0),
         spares: asset
             .spares
@@ -58,8 +69,9 @@ pub(crate) fn router(
             .map(|spare| Spares { instance: spare.instance, count: spare.count })
             .collect(),
     };
-    let viewer_json = serde_json::to_string_pretty(&json).expect("it is made of names and numbers").into();
-    let shared = Shared { hub, asset, work, viewer_json };
+    let text = |json| serde_json::to_string_pretty(json).expect("it is made of names and numbers").into();
+    let (open, own) = (text(&json), text(&ViewerJson { moq, ..json.clone() }));
+    let shared = Shared { hub, asset, work, viewer_json: ViewerJsons { open, own } };
     // Anyone may show the scene in a page of theirs; who may change it is a matter of tokens.
     let open = SetResponseHeaderLayer::overriding(
         header::ACCESS_CONTROL_ALLOW_ORIGIN,
@@ -92,9 +104,15 @@ pub(crate) fn router(
     }
 }
 
-async fn viewer_json_answer(State(shared): State<Shared>) -> Response {
-    let headers = [(header::CONTENT_TYPE, "application/json"), (header::CACHE_CONTROL, "no-cache")];
-    (headers, shared.viewer_json.to_string()).into_response()
+async fn viewer_json_answer(State(shared): State<Shared>, asked: HeaderMap) -> Response {
+    let headers = [
+        (header::CONTENT_TYPE, "application/json"),
+        (header::CACHE_CONTROL, "no-cache"),
+        (header::VARY, "origin"),
+    ];
+    let ViewerJsons { open, own } = &shared.viewer_json;
+    let json = if is_foreign(&asked) { open } else { own };
+    (headers, json.to_string()).into_response()
 }
 
 /// The scene under the name of its content: who has it need never ask again.

@@ -1,5 +1,7 @@
 //! Links that carry the messages of a live session.
 
+#[cfg(feature = "moq")]
+pub(crate) mod moq;
 pub(crate) mod ws;
 
 use std::future::Future;

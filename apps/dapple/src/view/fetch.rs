@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail};
 use dapple_scene::{NoFiles, Scene, Spare};
 
 use crate::inspect::MAX_RECORDING_BYTES;
-use crate::page::{FILE_NAME, Spares, ViewerJson, resolve};
+use crate::page::{FILE_NAME, MoqJson, Spares, ViewerJson, resolve};
 use crate::progress::Bar;
 use crate::source::MAX_SCENE_BYTES;
 
@@ -28,6 +28,8 @@ pub(super) struct Fetched {
     pub(super) stream: Option<Receiver<Piece>>,
     /// Where its live session is, `ws://…`.
     pub(super) live: Option<String>,
+    /// Where it is over MoQ.
+    pub(super) moq: Option<MoqJson>,
 }
 
 /// The next bytes, or why there are no more; the channel closes after the last.
@@ -68,7 +70,7 @@ pub(super) fn fetch(url: &str) -> Result<Fetched> {
         Some(stream) => Some(get_pieces(resolve(url, stream)?)?),
         None => None,
     };
-    Ok(Fetched { scene, title: scene_address, stream, live })
+    Ok(Fetched { scene, title: scene_address, stream, live, moq: json.moq })
 }
 
 fn open(address: &str) -> Result<(impl Read + Send + use<>, Option<u64>)> {

@@ -24,6 +24,7 @@ use anyhow::{Result, bail};
 use dapple_client::viewer::DrawOptions;
 
 use crate::args::{LightArgs, ViewArgs};
+use crate::live::Address;
 use crate::source;
 
 use dapple_session::GuestConfig;
@@ -37,10 +38,10 @@ use steer::Steering;
 /// Updates a second where none are given.
 const DEFAULT_HZ: f64 = 15.0;
 
-/// The scene that a folder's viewer.json names, and where its live session is.
-pub(crate) fn fetch_scene(url: &str) -> Result<(dapple_scene::Scene, Option<String>)> {
+/// The scene that a folder's viewer.json names, and where its live session is: over MoQ if that is asked for ([`Address::choose`]).
+pub(crate) fn fetch_scene(url: &str, moq: Option<&str>) -> Result<(dapple_scene::Scene, Option<Address>)> {
     let fetched = fetch::fetch(url)?;
-    Ok((fetched.scene, fetched.live))
+    Ok((fetched.scene, Address::choose(fetched.live, fetched.moq, moq)?))
 }
 
 /// Shows what the arguments name.
@@ -100,7 +101,8 @@ fn open(args: &ViewArgs) -> Result<Opening> {
         Some(url) => {
             let fetched = fetch::fetch(url)?;
             let scene = Arc::new(fetched.scene);
-            let feed = match (fetched.live, fetched.stream) {
+            let live = Address::choose(fetched.live, fetched.moq, args.moq.as_deref())?;
+            let feed = match (live, fetched.stream) {
                 (Some(address), _) => {
                     let bits_per_s = args.step.budget.map(|rate| rate.0);
                     let seed = u64::from(std::process::id());

@@ -10,7 +10,7 @@ use dapple_session::guest::Latency;
 use dapple_session::{Event, Guest, GuestConfig, Held, News, Role, Status};
 use tokio::sync::watch;
 
-use crate::live::{LinkState, SharedGuest, keep};
+use crate::live::{Address, LinkState, SharedGuest, keep};
 
 /// Most frames that wait to be applied; a window that is hidden for longer gets a snapshot when it is seen again.
 const MAX_WAITING: usize = 512;
@@ -46,8 +46,8 @@ pub(super) struct RemoteFigures {
 }
 
 impl Remote {
-    /// Joins the session at `ws://…`.
-    pub(super) fn join(address: String, scene: &Arc<Scene>, config: GuestConfig) -> Result<Remote> {
+    /// Joins a session.
+    pub(super) fn join(address: Address, scene: &Arc<Scene>, config: GuestConfig) -> Result<Remote> {
         let shared = Arc::new(SharedGuest::new(Guest::new(scene.clone(), config)));
         let (frame_sender, frames) = sync_channel(MAX_WAITING);
         let has_overflown = Arc::new(AtomicBool::new(false));

@@ -78,7 +78,7 @@ pub enum News {
 pub struct Guest {
     scene: Arc<Scene>,
     config: GuestConfig,
-    hello: Option<u64>,
+    hello_us: Option<u64>,
     welcome: Option<Welcome>,
     key: Option<String>,
     is_connected: bool,
@@ -105,7 +105,7 @@ impl Guest {
         Guest {
             edits: Edits::new(&scene),
             scene,
-            hello: None,
+            hello_us: None,
             welcome: None,
             key: None,
             is_connected: false,
@@ -128,7 +128,7 @@ impl Guest {
 
     /// There is a connection: the next message is a hello.
     pub fn connected(&mut self, now_us: u64) {
-        (self.is_connected, self.hello, self.welcome) = (true, None, None);
+        (self.is_connected, self.hello_us, self.welcome) = (true, None, None);
         (self.look.came, self.look.lost, self.said_us) = (0, 0, now_us);
         (self.look.heard_us, self.heard_at_us) = (0, now_us);
         // Versions count anew with another host; what was changed stays until the state comes.
@@ -264,26 +264,30 @@ impl Guest {
             return None;
         }
         if self.welcome.is_none() {
-            if self.hello.is_some_and(|said_us| now_us.saturating_sub(said_us) < HELLO_EVERY_US) {
+            if self.hello_us.is_some_and(|said_us| now_us.saturating_sub(said_us) < HELLO_EVERY_US) {
                 return None;
             }
-            self.hello = Some(now_us);
-            let hello = Hello {
-                protocol: PROTOCOL,
-                wire: dapple_stream::codec::VERSION,
-                scene: self.scene.hash().0.iter().map(|byte| format!("{byte:02x}")).collect(),
-                token: self.config.token.clone(),
-                key: self.key.clone(),
-                held: self.held,
-                bits_per_s: self.config.bits_per_s,
-            };
-            return Some(FromViewer::Hello(hello).to_text());
+            self.hello_us = Some(now_us);
+            return Some(FromViewer::Hello(self.hello()).to_text());
         }
         let per_s = self.welcome.as_ref().map_or(1, |welcome| welcome.events_per_s);
         if let Some((number, event)) = self.pending.next(now_us, per_s) {
             return Some(FromViewer::Event { number, event }.to_text());
         }
         self.next_look(now_us)
+    }
+
+    /// What it would say now to be let in.
+    pub fn hello(&self) -> Hello {
+        Hello {
+            protocol: PROTOCOL,
+            wire: dapple_stream::codec::VERSION,
+            scene: self.scene.hash().0.iter().map(|byte| format!("{byte:02x}")).collect(),
+            token: self.config.token.clone(),
+            key: self.key.clone(),
+            held: self.held,
+            bits_per_s: self.config.bits_per_s,
+        }
     }
 
     fn next_look(&mut self, now_us: u64) -> Option<String> {

@@ -11,6 +11,9 @@ use crate::{FromHost, Held};
 /// A group begins no sooner after the one before, microseconds.
 const SHORTEST_US: u64 = 1_000_000;
 
+/// A group of light is no longer than this, microseconds: what nobody has asked for since then may have been forgotten on its way.
+const LONGEST_US: u64 = 15_000_000;
+
 /// Most messages of a group of light: some viewers take no more than 1024.
 const MAX_LIGHT_MESSAGES: usize = 512;
 
@@ -77,8 +80,9 @@ impl LightGroups {
 
     /// Whoever joins must take the snapshot and the whole group: it should cost little more than the snapshot alone.
     fn is_due(&self, now_us: u64) -> bool {
+        let lasted_us = now_us.saturating_sub(self.began_us);
         let is_long = self.bytes > self.snapshot_bytes / 4 + 4096 || self.messages >= MAX_LIGHT_MESSAGES;
-        is_long && now_us.saturating_sub(self.began_us) >= SHORTEST_US
+        is_long && lasted_us >= SHORTEST_US || lasted_us >= LONGEST_US
     }
 
     fn begin(&mut self, snapshot: SharedLight, now_us: u64) -> Piece<Vec<Arc<[u8]>>> {
@@ -116,8 +120,8 @@ pub struct StateGroups {
 impl StateGroups {
     /// What is to be written next. Of the arrival only the time counts.
     pub fn next(&mut self, host: &mut Host, arrival: &Arrival, now_us: u64) -> Piece<Arc<str>> {
-        let is_due = self.messages >= MAX_STATE_MESSAGES
-            && now_us.saturating_sub(self.began_us) >= SHORTEST_US;
+        let is_due =
+            self.messages >= MAX_STATE_MESSAGES && now_us.saturating_sub(self.began_us) >= SHORTEST_US;
         if is_due && let Some(link) = self.link.take() {
             host.leave(link, now_us);
         }

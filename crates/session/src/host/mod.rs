@@ -2,8 +2,8 @@
 
 mod access;
 mod bucket;
-mod ladder;
 mod groups;
+mod ladder;
 mod queue;
 mod shared;
 mod state;
@@ -25,7 +25,8 @@ pub use types::{Arrival, HostConfig, HostCounts, Link, Next, Outgoing, Shared, S
 use viewer::Viewer;
 
 use crate::{
-    Event, FromHost, FromViewer, Held, Hello, LookCamera, PROTOCOL, Reason, Refusal, Role, SceneClock, Welcome,
+    Event, FromHost, FromViewer, Held, Hello, LookCamera, PROTOCOL, Reason, Refusal, Role, SceneClock,
+    Welcome,
 };
 
 /// Most ages kept between two questions.

@@ -200,7 +200,8 @@ impl Drill {
                 self.host.leave(link, host_us);
             }
             let key = format!("{:032x}", self.random.bits());
-            let arrival = Arrival { key, is_reliable: peer.is_ordered, is_foreign: false, shares: false, unix_us: 0 };
+            let arrival =
+                Arrival { key, is_reliable: peer.is_ordered, is_foreign: false, shares: false, unix_us: 0 };
             match self.host.join(&hello, arrival, host_us) {
                 Ok(link) => peer.link = Some(link),
                 Err(refusal) => peer.refused.push(refusal),

@@ -1,0 +1,488 @@
+//! `dapple serve --moq` and viewers of it, directly and through relays nobody here wrote.
+#![cfg(all(unix, feature = "moq"))]
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
+
+mod common;
+
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use common::command::fail;
+use common::live::{Served, Viewer};
+use dapple_moq::moq_net::{Timestamp, origin};
+use dapple_moq::{LinkError, Message, Names, ViewerIn, ViewerOut, Wish};
+use dapple_scene::{Edit, Placement, Scene};
+use dapple_session::{Event, Guest, GuestConfig, GuestError, Held, News, Reason, Role};
+use dapple_stream::{Applied, Limits, Subscriber};
+use moq_tokio::Connection;
+use tempfile::TempDir;
+use tokio::runtime::Runtime;
+
+fn runtime() -> Runtime {
+    tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap()
+}
+
+fn config(seed: u64) -> GuestConfig {
+    GuestConfig { seed, ..GuestConfig::default() }
+}
+
+fn place(node: u32, x: f32) -> Event {
+    let placement = Placement { translation: [x, 0.4, 0.2], rotation: [0.0, 0.0, 0.0, 1.0], scale: [0.5; 3] };
+    Event::Edit { change: Edit::Place { node, placement } }
+}
+
+/// Where a session is.
+#[derive(Clone)]
+struct At {
+    url: String,
+    name: String,
+    certificate: Option<String>,
+}
+
+impl At {
+    /// As the page is told.
+    fn of(served: &Served) -> At {
+        let json: serde_json::Value = serde_json::from_str(&served.text("/viewer.json")).unwrap();
+        let text = |field: &str| json["moq"][field].as_str().map(str::to_owned);
+        At { url: text("url").unwrap(), name: text("name").unwrap(), certificate: text("certificate") }
+    }
+
+    async fn connect(&self) -> (Connection, origin::Producer, origin::Producer) {
+        let mut config = moq_tokio::connect::Config::default();
+        config.tls.fingerprint = self.certificate.clone().into_iter().collect();
+        let (from, to) = (moq_tokio::origin::spawn(), moq_tokio::origin::spawn());
+        let client = config.init(Default::default()).unwrap().with_reconnect(false);
+        let client = client.with_publisher(&to).with_subscriber(from.clone());
+        let connecting = client.connect(self.url.parse::<url::Url>().unwrap()).established();
+        let connection = tokio::time::timeout(Duration::from_secs(10), connecting).await.unwrap().unwrap();
+        (connection, from, to)
+    }
+}
+
+/// A viewer over MoQ that decodes everything.
+struct MoqViewer {
+    guest: Guest,
+    subscriber: Subscriber,
+    out: ViewerOut,
+    inbound: ViewerIn,
+    _connection: (Connection, origin::Producer, origin::Producer),
+    began: Instant,
+    snapshots: u32,
+    refused: Option<GuestError>,
+    ended: Option<String>,
+}
+
+impl MoqViewer {
+    async fn join(at: &At, scene: &Arc<Scene>, config: GuestConfig) -> MoqViewer {
+        let connection = at.connect().await;
+        let mut guest = Guest::new(scene.clone(), config);
+        let hello = guest.hello();
+        let mut secret = [0; 16];
+        getrandom::fill(&mut secret).unwrap();
+        let wish = Wish {
+            scene: hello.scene,
+            bits_per_s: hello.bits_per_s,
+            viewer: dapple_session::host::hex(&secret),
+        };
+        let names = Names::new(&at.name).unwrap();
+        let from = connection.1.consume();
+        let joining = dapple_moq::join(&from, &connection.2, &names, &wish);
+        let (out, inbound) = tokio::time::timeout(Duration::from_secs(20), joining).await.unwrap().unwrap();
+        guest.connected(0);
+        let subscriber = Subscriber::new(Some(scene.hash().0), Limits::default());
+        MoqViewer {
+            guest,
+            subscriber,
+            out,
+            inbound,
+            _connection: connection,
+            began: Instant::now(),
+            snapshots: 0,
+            refused: None,
+            ended: None,
+        }
+    }
+
+    fn now_us(&self) -> u64 {
+        self.began.elapsed().as_micros() as u64
+    }
+
+    async fn talk(&mut self) {
+        while let Some(text) = self.guest.next(self.now_us()) {
+            if let Err(error) = self.out.send(&text) {
+                self.ended = Some(error.to_string());
+            }
+        }
+        let waiting = tokio::time::timeout(Duration::from_millis(10), self.inbound.receive());
+        let news = match waiting.await {
+            Err(_) => return,
+            Ok(Ok(Some(Message::Text(text)))) => self.guest.receive_text(&text),
+            Ok(Ok(Some(Message::Bytes(bytes)))) => self.guest.receive_bytes(&bytes, self.now_us()),
+            Ok(Ok(None)) => {
+                self.ended.get_or_insert("in order".to_owned());
+                return tokio::time::sleep(Duration::from_millis(10)).await;
+            }
+            Ok(Err(LinkError::Ended(reason) | LinkError::Refused(reason))) => {
+                self.ended.get_or_insert(reason);
+                return;
+            }
+        };
+        match news {
+            Ok(News::Light(frame)) if !frame.is_empty() => {
+                let applied = self.subscriber.receive(&frame);
+                self.snapshots += u32::from(matches!(applied, Ok(Applied::NewLayout)));
+                let held = self.subscriber.group().zip(self.subscriber.epoch());
+                let held = held.map(|(group, epoch)| Held { group, epoch });
+                self.guest.applied(held, applied.is_ok());
+            }
+            Ok(News::Welcome(false)) => self.subscriber.outdate(),
+            Ok(_) => {}
+            Err(error) => self.refused = Some(error),
+        }
+    }
+
+    async fn until(&mut self, what: &str, mut holds: impl FnMut(&MoqViewer) -> bool) {
+        let start = Instant::now();
+        while !holds(self) {
+            assert!(
+                start.elapsed() < Duration::from_secs(60),
+                "waited in vain until {what}: {:?}",
+                self.ended
+            );
+            self.talk().await;
+        }
+    }
+
+    fn has_light(&self) -> bool {
+        self.subscriber.store().is_some()
+    }
+
+    fn held(&self) -> Option<(u64, u64, &[u8])> {
+        let subscriber = &self.subscriber;
+        Some((subscriber.group()?, subscriber.epoch()?, subscriber.store()?.visibility()))
+    }
+}
+
+/// Lets all talk until they hold the same light as the one over WebSocket, and for a while nothing new comes.
+async fn settle(oracle: &mut Viewer, viewers: &mut [&mut MoqViewer]) {
+    let start = Instant::now();
+    let mut still_since = Instant::now();
+    let mut last = None;
+    while still_since.elapsed() < Duration::from_millis(700) {
+        oracle.run(Duration::from_millis(20));
+        for viewer in viewers.iter_mut() {
+            for _ in 0..20 {
+                viewer.talk().await;
+            }
+        }
+        let now = (oracle.held().map(|(group, epoch, _)| (group, epoch)), oracle.guest.version());
+        let all: Vec<_> = viewers
+            .iter()
+            .map(|v| (v.held().map(|(group, epoch, _)| (group, epoch)), v.guest.version()))
+            .collect();
+        assert!(start.elapsed() < Duration::from_secs(60), "they hold different things: {now:?}, {all:?}");
+        if last != Some(now) || now.0.is_none() || all.iter().any(|of| *of != now) {
+            still_since = Instant::now();
+        }
+        last = Some(now);
+    }
+    for viewer in viewers {
+        assert!(viewer.held() == oracle.held(), "they hold the same epoch and different light");
+        assert_eq!(viewer.guest.edits(), oracle.guest.edits());
+    }
+}
+
+/// One viewer at each address: moves things, joins late, and holds to the bit what one over WebSocket holds.
+async fn converge(served: &Served, at: &[At]) {
+    let scene = served.scene();
+    let mut oracle = Viewer::join(served.port, &scene, config(1));
+    oracle.until("the first light", Viewer::has_light);
+    let mut viewers = Vec::new();
+    for (seed, at) in at.iter().enumerate() {
+        let mut viewer = MoqViewer::join(at, &scene, config(10 + seed as u64)).await;
+        viewer.until("the first light", MoqViewer::has_light).await;
+        viewers.push(viewer);
+    }
+    let node = scene.instances[1].node;
+    for (index, viewer) in viewers.iter_mut().enumerate() {
+        viewer.until("it may change things", |v| v.guest.role() == Some(Role::Interact)).await;
+        assert!(viewer.guest.send(place(node, 0.1 * index as f32)));
+        viewer.until("its event is answered", |v| !v.guest.has_pending()).await;
+    }
+    // Long enough that groups begin while they watch.
+    let start = Instant::now();
+    while start.elapsed() < Duration::from_secs(3) {
+        oracle.run(Duration::from_millis(10));
+        for viewer in &mut viewers {
+            viewer.talk().await;
+        }
+    }
+    assert!(oracle.guest.send(Event::Pause));
+    oracle.until("the event is answered", |v| !v.guest.has_pending());
+    // Who comes now gets a group that began before.
+    for at in at {
+        let mut viewer = MoqViewer::join(at, &scene, config(99)).await;
+        viewer.until("the light of one who joins late", MoqViewer::has_light).await;
+        viewers.push(viewer);
+    }
+    settle(&mut oracle, &mut viewers.iter_mut().collect::<Vec<_>>()).await;
+    for viewer in &viewers {
+        assert!(
+            viewer.refused.is_none() && viewer.ended.is_none(),
+            "{:?} {:?}",
+            viewer.refused,
+            viewer.ended
+        );
+        assert_eq!(viewer.snapshots, 1, "one to begin with, and never again");
+    }
+    assert_eq!(served.figure("dapple_events_total"), at.len() as f64 + 1.0);
+}
+
+#[test]
+fn viewers_over_quic_hold_what_those_over_websocket_hold() {
+    let folder = TempDir::new().unwrap();
+    let served = Served::start(folder.path(), 0, &["--moq", "--threshold", "0"]);
+    let at = At::of(&served);
+    assert!(at.url.starts_with("https://127.0.0.1:") && at.certificate.is_some());
+    runtime().block_on(async {
+        converge(&served, &[at.clone(), at.clone()]).await;
+        // Another has the same scene file, and not the same scene.
+        let mut other = (*served.scene()).clone();
+        other.add_spares(&[dapple_scene::Spare { instance: 1, count: 1 }]).unwrap();
+        let mut stranger = MoqViewer::join(&at, &Arc::new(other), config(3)).await;
+        stranger.until("it is refused", |v| v.refused.is_some()).await;
+        assert!(
+            matches!(&stranger.refused, Some(GuestError::Refused(r)) if r.reason == Reason::Scene),
+            "{:?}",
+            stranger.refused
+        );
+    });
+}
+
+#[test]
+fn pages_of_others_do_not_learn_where_the_session_is() {
+    let folder = TempDir::new().unwrap();
+    let served = Served::start(folder.path(), 0, &["--moq"]);
+    let (_, _, body) = served.get("/viewer.json", "Origin: http://elsewhere.example\r\n");
+    let json: serde_json::Value = serde_json::from_slice(&body).unwrap();
+    assert!(json["moq"].is_null() && json["live"].is_string(), "{json}");
+    // Two hosts of one scene have different names.
+    let other = Served::start(folder.path(), 0, &["--moq"]);
+    assert_ne!(At::of(&served).name, At::of(&other).name);
+}
+
+#[test]
+fn tokens_and_places_are_counted_as_over_websocket() {
+    let folder = TempDir::new().unwrap();
+    let more = ["--moq", "--token", "interact=secret", "--max-viewers", "1"];
+    let served = Served::start(folder.path(), 0, &more);
+    let (at, scene) = (At::of(&served), served.scene());
+    runtime().block_on(async {
+        let mut plain = MoqViewer::join(&at, &scene, config(1)).await;
+        plain.until("the first light", MoqViewer::has_light).await;
+        let start = Instant::now();
+        while start.elapsed() < Duration::from_secs(1) {
+            plain.talk().await;
+        }
+        assert_eq!(plain.guest.role(), Some(Role::View));
+        assert_eq!(served.figure("dapple_viewers"), 1.0);
+        // There is no place among those who are heard: it looks on, and its light goes on.
+        let token = Some("secret".to_owned());
+        let mut more = MoqViewer::join(&at, &scene, GuestConfig { token: token.clone(), ..config(2) }).await;
+        more.until("light that changes", |v| v.held().is_some_and(|(_, epoch, _)| epoch > 3)).await;
+        assert_eq!((more.guest.role(), served.figure("dapple_viewers")), (Some(Role::View), 1.0));
+        drop((plain, more));
+        // The place is free once its viewer is gone.
+        let start = Instant::now();
+        while served.figure("dapple_viewers") > 0.0 {
+            assert!(start.elapsed() < Duration::from_secs(40), "it is still there");
+            tokio::time::sleep(Duration::from_millis(100)).await;
+        }
+        let mut wrong =
+            MoqViewer::join(&at, &scene, GuestConfig { token: Some("no".to_owned()), ..config(3) }).await;
+        wrong.until("it is refused", |v| v.refused.is_some()).await;
+        assert!(matches!(&wrong.refused, Some(GuestError::Refused(r)) if r.reason == Reason::Token));
+        let mut right = MoqViewer::join(&at, &scene, GuestConfig { token, ..config(4) }).await;
+        right.until("it may change things", |v| v.guest.role() == Some(Role::Interact)).await;
+    });
+}
+
+#[test]
+fn who_breaks_rules_is_not_heard_and_nobody_else_notices() {
+    let folder = TempDir::new().unwrap();
+    let served = Served::start(folder.path(), 0, &["--moq"]);
+    let (at, scene) = (At::of(&served), served.scene());
+    runtime().block_on(async {
+        let mut steady = MoqViewer::join(&at, &scene, config(1)).await;
+        steady.until("the first light", MoqViewer::has_light).await;
+        let (_connection, _from, to) = at.connect().await;
+        let names = Names::new(&at.name).unwrap();
+        let mut kept = Vec::new();
+        let say = |viewer: &str, frames: &[Vec<u8>]| {
+            let broadcast = to.create_broadcast(names.from_viewer(viewer).as_str()).unwrap();
+            let (talk, looks) = (
+                broadcast.create_track("talk", None).unwrap(),
+                broadcast.create_track("looks", None).unwrap(),
+            );
+            let mut group = talk.append_group().unwrap();
+            for frame in frames {
+                let _ = group.write_frame(Timestamp::now(), frame.clone());
+            }
+            let _ = broadcast.announce(origin::Route::default());
+            (broadcast, talk, looks, group)
+        };
+        let name = |number: usize| format!("{number:032x}");
+        // Random bytes, a huge message, words without a hello, another version, and many that say nothing.
+        kept.push(say(&name(1), &[vec![0xff; 100]]));
+        kept.push(say(&name(2), &[vec![b' '; 8 << 20]]));
+        kept.push(say(&name(3), &[br#"{"type":"bye"}"#.to_vec()]));
+        kept.push(say(&name(4), &[br#"{"type":"hello","protocol":999,"wire":1,"scene":"00"}"#.to_vec()]));
+        for number in 10..300 {
+            kept.push(say(&name(number), &[]));
+        }
+        // A name that is none, and one that is somebody's to be written to only by the host.
+        kept.push(say("short", &[br#"{"type":"bye"}"#.to_vec()]));
+        let forged = to.create_broadcast(at.name.as_str()).unwrap();
+        let state = forged.create_track("state", None).unwrap();
+        let mut group = state.append_group().unwrap();
+        let refused = r#"{"type":"refused","reason":"closing","message":"forged"}"#;
+        group.write_frame(Timestamp::now(), refused).unwrap();
+        let _ = forged.announce(origin::Route::default());
+        let start = Instant::now();
+        while start.elapsed() < Duration::from_secs(7) {
+            steady.talk().await;
+        }
+        assert!(
+            steady.refused.is_none() && steady.ended.is_none(),
+            "{:?} {:?}",
+            steady.refused,
+            steady.ended
+        );
+        assert_eq!(served.figure("dapple_viewers"), 1.0);
+        let mut late = MoqViewer::join(&at, &scene, config(2)).await;
+        late.until("the light of one who joins late", MoqViewer::has_light).await;
+        late.until("it may change things", |v| v.guest.role() == Some(Role::Interact)).await;
+        drop(kept);
+    });
+}
+
+#[test]
+fn a_host_that_ends_says_so_and_one_that_dies_is_noticed() {
+    let folder = TempDir::new().unwrap();
+    let served = Served::start(folder.path(), 0, &["--moq"]);
+    let (at, scene) = (At::of(&served), served.scene());
+    let runtime = runtime();
+    let mut viewer = runtime.block_on(async {
+        let mut viewer = MoqViewer::join(&at, &scene, config(1)).await;
+        viewer.until("the first light", MoqViewer::has_light).await;
+        viewer.until("it may change things", |v| v.guest.role() == Some(Role::Interact)).await;
+        viewer
+    });
+    served.signal("-TERM");
+    runtime.block_on(viewer.until("it hears of the end", |v| v.refused.is_some() || v.ended.is_some()));
+    assert!(
+        matches!(&viewer.refused, Some(GuestError::Refused(r)) if r.reason == Reason::Closing),
+        "{:?} {:?}",
+        viewer.refused,
+        viewer.ended
+    );
+    assert!(served.wait().0, "it ended well");
+}
+
+#[test]
+fn what_cannot_be_is_said_clearly() {
+    let folder = TempDir::new().unwrap();
+    let serve = ["serve", "--builtin", "cornell", "--port", "0"];
+    let with = |more: &[&'static str]| [&serve[..], more].concat();
+    fail(folder.path(), &with(&["--moq-name", "x"]), &["--moq"]);
+    fail(folder.path(), &with(&["--moq", "--moq-name", "a b"]), &["a b", "letters"]);
+    fail(folder.path(), &with(&["--relay", "nowhere"]), &["--relay", "nowhere"]);
+    fail(folder.path(), &with(&["--relay", "ftp://host/"]), &["--relay", "https://"]);
+    let taken = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    let port = taken.local_addr().unwrap().port().to_string();
+    let message = fail(folder.path(), &[&serve[..], &["--moq", &port]].concat(), &["--moq", &port]);
+    assert!(message.contains("in use"), "{message}");
+    // What is not served over MoQ cannot be viewed over it.
+    let served = Served::start(folder.path(), 0, &[]);
+    let url = format!("http://127.0.0.1:{}/", served.port);
+    fail(folder.path(), &["view", "--url", &url, "--moq", "--headless"], &["--moq", "dapple serve --moq"]);
+}
+
+/// A relay as it comes, if it is installed.
+struct Relay {
+    child: Child,
+    url: String,
+}
+
+impl Relay {
+    /// Starts one that dials `up`, if that is given; `None` where there is none to be had.
+    fn start(folder: &TempDir, up: Option<&str>) -> Option<Relay> {
+        let built = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/relay/bin/moq-relay");
+        let program = std::env::var_os("MOQ_RELAY").map_or(built, Into::into);
+        if !program.is_file() {
+            assert!(
+                std::env::var_os("REQUIRE_MOQ_RELAY").is_none_or(|value| value.is_empty() || value == "0"),
+                "{} is missing: cargo xtask relay",
+                program.display()
+            );
+            println!("skipped: {} is missing: cargo xtask relay", program.display());
+            return None;
+        }
+        // Free for UDP and TCP alike, until it takes both.
+        let port = loop {
+            let tcp = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+            let port = tcp.local_addr().unwrap().port();
+            if std::net::UdpSocket::bind(("127.0.0.1", port)).is_ok() {
+                break port;
+            }
+        };
+        let listen = format!("127.0.0.1:{port}");
+        let log = std::fs::File::create(folder.path().join(format!("relay-{port}.log"))).unwrap();
+        let mut command = Command::new(program);
+        command.args(["--listen", &listen, "--listen-tls-generate", "localhost,127.0.0.1"]);
+        command.args(["--web-http-listen", &listen, "--auth-public", "**"]);
+        if let Some(up) = up {
+            command.args(["--cluster-connect", up]);
+        }
+        let child =
+            command.stdin(Stdio::null()).stdout(log.try_clone().unwrap()).stderr(log).spawn().unwrap();
+        let start = Instant::now();
+        while std::net::TcpStream::connect(&listen).is_err() {
+            assert!(start.elapsed() < Duration::from_secs(20), "the relay does not listen on {listen}");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        Some(Relay { child, url: format!("http://{listen}/") })
+    }
+}
+
+impl Drop for Relay {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+#[test]
+fn two_relays_in_a_chain_carry_the_same_bytes() {
+    let folder = TempDir::new().unwrap();
+    let Some(first) = Relay::start(&folder, None) else { return };
+    let Some(second) = Relay::start(&folder, Some(&first.url)) else { return };
+    let served = Served::start(
+        folder.path(),
+        0,
+        &["--relay", &first.url, "--moq-name", "test/one", "--threshold", "0"],
+    );
+    let at = |relay: &Relay| At { url: relay.url.clone(), name: "test/one".to_owned(), certificate: None };
+    runtime().block_on(async {
+        converge(&served, &[at(&first), at(&second)]).await;
+        // The second goes away: who was connected to it is told, and comes to the light by the first.
+        let scene = served.scene();
+        let mut viewer = MoqViewer::join(&at(&second), &scene, config(7)).await;
+        viewer.until("light", MoqViewer::has_light).await;
+        drop(second);
+        viewer.until("it is noticed", |v| v.ended.is_some()).await;
+        let mut viewer = MoqViewer::join(&at(&first), &scene, config(7)).await;
+        viewer.until("light by the other", MoqViewer::has_light).await;
+    });
+}
