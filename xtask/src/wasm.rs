@@ -57,16 +57,14 @@ pub(crate) fn build(root: &Path, target_folder: &Path, cargo: impl Fn(&[&str]) -
         bail!("Rust cannot compile for browsers here: run `rustup target add {TARGET}`");
     }
     let profile = format!("--profile={PROFILE}");
-    cargo(&[
-        "rustc",
-        "--package=dapple-web",
-        "--lib",
-        "--crate-type=cdylib",
-        &format!("--target={TARGET}"),
-        &profile,
-    ])?;
-    let program = target_folder.join(TARGET).join(PROFILE).join("dapple_web.wasm");
-    let [program, page, out] = [program, root.join("apps/web/page"), target_folder.join("web")];
+    // Apart: what speaks WebTransport is fetched by those pages alone that use it.
+    for package in ["dapple-web", "dapple-web-moq"] {
+        let package = format!("--package={package}");
+        let target = format!("--target={TARGET}");
+        cargo(&["rustc", &package, "--lib", "--crate-type=cdylib", &target, &profile])?;
+    }
+    let programs = target_folder.join(TARGET).join(PROFILE);
+    let [page, out] = [root.join("apps/web/page"), target_folder.join("web")];
     let path = |path: &Path| path.to_str().map(str::to_owned).context("a folder's name is not UTF-8");
     cargo(&[
         "run",
@@ -75,7 +73,7 @@ pub(crate) fn build(root: &Path, target_folder: &Path, cargo: impl Fn(&[&str]) -
         "--features=web",
         "--bin=assemble-web",
         "--",
-        &path(&program)?,
+        &path(&programs)?,
         &path(&page)?,
         &path(&out)?,
     ])?;

@@ -1,9 +1,14 @@
 //! Pages in a real browser take part in a scene that `dapple serve` lights: what one moves, the others see moved.
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
+#[cfg(all(unix, feature = "moq"))]
+mod common;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+#[cfg(all(unix, feature = "moq"))]
+use common::live::Served;
 use serde_json::{Value, json};
 
 /// Node.js, the browser, the driver's script and the built page.
@@ -58,13 +63,53 @@ fn difference(folder: &Path, [a, b]: [&str; 2]) -> f64 {
     count as f64 / f64::from(a.width() * a.height())
 }
 
-#[test]
-fn what_one_page_moves_the_others_see() {
-    let Some([node, browser, driver, page]) = tools() else { return };
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("live-page");
+/// Runs a driver's script with a plan; gives the facts that it found.
+fn drive(node: &Path, driver: &Path, folder: &Path, plan: &Value) -> Value {
+    let file = folder.join("plan.json");
+    std::fs::write(&file, plan.to_string()).unwrap();
+    let output = Command::new(node).args([driver, &file]).stdin(Stdio::null()).output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "the driver ended with {}:\n{errors}", output.status);
+    let facts: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(facts["errors"], json!([]), "{facts:#}");
+    facts
+}
+
+/// An empty folder for what a test leaves behind.
+fn folder_of(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     // What an earlier run left is no error.
     let _ = std::fs::remove_dir_all(&folder);
     std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+#[test]
+#[cfg(all(unix, feature = "moq"))]
+fn pages_over_webtransport_see_what_those_over_a_websocket_see() {
+    let Some([node, browser, driver, page]) = tools() else { return };
+    let folder = folder_of("moq-page");
+    let served = Served::start(&folder, 0, &["--moq", "--page", page.to_str().unwrap()]);
+    // Nobody answers there: it is held, and not listened to.
+    let dead = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    let plan = json!({
+        "browser": browser, "url": format!("http://127.0.0.1:{}/", served.port), "out": folder,
+        "port": dead.local_addr().unwrap().port(),
+    });
+    let facts = drive(&node, &driver.with_file_name("moq.mjs"), &folder, &plan);
+    assert_eq!(facts["transports"], json!(["WebTransport", "WebTransport", "WebSocket"]), "{facts:#}");
+    assert_eq!(facts["placed"][0], facts["placed"][1], "{facts:#}");
+    assert_eq!(facts["placed"][0], facts["placed"][2], "{facts:#}");
+    assert_eq!(facts["figures"], "WebTransport");
+    assert!(facts["text"].as_str().unwrap().contains("live"), "{facts:#}");
+    assert!(facts["light"][0].as_u64().unwrap() > 1000 && facts["light"][0] == facts["light"][2], "{facts:#}");
+    assert_eq!(facts["walled"], "WebSocket", "{facts:#}");
+}
+
+#[test]
+fn what_one_page_moves_the_others_see() {
+    let Some([node, browser, driver, page]) = tools() else { return };
+    let folder = folder_of("live-page");
     let page = page.to_str().unwrap();
     let spares: Vec<String> = (0..12).map(|i| format!("boulder-{i}=1")).collect();
     let serve = |detail: &'static str| {
@@ -79,13 +124,7 @@ fn what_one_page_moves_the_others_see() {
         "browser": browser, "program": env!("CARGO_BIN_EXE_dapple"), "serve": serve("0.2"), "other": serve("0.1"),
         "token": "touch", "out": folder,
     });
-    let file = folder.join("plan.json");
-    std::fs::write(&file, plan.to_string()).unwrap();
-    let output = Command::new(node).args([&driver, &file]).stdin(Stdio::null()).output().unwrap();
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "the driver ended with {}:\n{errors}", output.status);
-    let facts: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert_eq!(facts["errors"], json!([]), "{facts:#}");
+    let facts = drive(&node, &driver, &folder, &plan);
 
     assert_eq!(facts["roles"], json!(["interact", "view"]));
     assert_eq!(facts["bits"], 500_000);

@@ -68,6 +68,8 @@ export interface LiveStatus {
   reason: string | null;
   /** The same for people. */
   message: string | null;
+  /** What carries it. */
+  transport: "WebTransport" | "WebSocket";
   /** Whether the server has let the viewer in, and whether light ever came. */
   connected: boolean;
   hasLight: boolean;
@@ -121,6 +123,16 @@ export interface Picked {
   position: [number, number, number];
 }
 
+/** A live session over Media over QUIC, as viewer.json names it. */
+export interface MoqPlace {
+  /** Address of the server or of a relay, `https:`. */
+  url: string;
+  /** Name of the server's broadcast. */
+  name: string;
+  /** SHA-256 of its certificate, in hexadecimal, where no authority vouches for it. */
+  certificate?: string;
+}
+
 export interface Options {
   /** Address of a self-contained .glb (or .gltf with embedded data, or .obj). */
   scene: string;
@@ -129,6 +141,10 @@ export interface Options {
   /** Address of a live session of the scene instead (`dapple serve`), `ws:` or `wss:` by the page's own scheme. `time`,
    * `loop` and `paused` mean nothing then: time is everyone's. */
   live?: string;
+  /** Where the same session is over WebTransport, which is used where the browser has it, before `live`. */
+  moq?: MoqPlace;
+  /** Default `auto`: WebTransport where there is such, else a WebSocket. */
+  transport?: "auto" | "websocket";
   /** What gives the viewer its role, where the server asks for that. */
   token?: string;
   /** Most bits of light a second, on average over seconds, without the first light. Default: as many as there are. */

@@ -107,9 +107,10 @@ class Viewer {
   }
 
   #openLive(url) {
-    const { token, bits = 0 } = this.#options;
+    const { token, bits = 0, moq, transport = "auto" } = this.#options;
     this.#core.openLive(token || undefined, bits, Math.floor(Math.random() * 2 ** 32));
-    this.#link = new LiveLink(url, () => this.#core, {
+    const way = { moq: transport === "websocket" ? null : moq, bits };
+    this.#link = new LiveLink(url, way, () => this.#core, {
       status: () => this.#options.onLive?.(this.live),
       light: () => {
         if (!this.#streamed) this.#progress("stream", 1, 1);

@@ -1,5 +1,7 @@
-// The connection of a live session: a WebSocket that comes back by itself. What is said over it is the program's
-// (liveText, liveBytes, liveNext of Core).
+// The connection of a live session: WebTransport where there is such, else a WebSocket; it comes back by itself. What is said over it is the
+// program's (liveText, liveBytes, liveNext of Core).
+
+import { MoqSocket, hasWebTransport } from "./moq.js";
 
 // How often it is asked whether there is anything to say, milliseconds.
 const ASK_EVERY = 50;
@@ -24,6 +26,10 @@ export class LiveLink {
   #heardAt = 0;
   #wasOpen = false;
   #applySeconds = 0;
+  // Where it is over WebTransport, and most bits a second; null for a WebSocket.
+  #moq;
+  #bits;
+  #isMoq = false;
   #detach = [];
   // connecting, live, reconnecting, refused, closed
   #state = "connecting";
@@ -31,10 +37,12 @@ export class LiveLink {
   #reason = null;
   #message = null;
 
-  // `core()` gives the program's side, null once it is gone. `on` has functions: status(), light(), progress(loaded,
+  // `moq` says where the session is over WebTransport (null for a WebSocket alone), `bits` the most a second that is wanted. `core()` gives the program's side, null once it is gone. `on` has functions: status(), light(), progress(loaded,
   // total), rejected(message).
-  constructor(url, core, on) {
+  constructor(url, { moq = null, bits = 0 }, core, on) {
     this.#url = url;
+    this.#moq = moq && hasWebTransport() ? moq : null;
+    this.#bits = bits;
     this.#core = core;
     this.#on = on;
     this.#timer = setInterval(() => this.#pump(), ASK_EVERY);
@@ -54,6 +62,7 @@ export class LiveLink {
       retryIn: waits ? Math.max(0, (this.#retryAt - performance.now()) / 1000) : null,
       reason: this.#reason,
       message: this.#message,
+      transport: this.#isMoq ? "WebTransport" : "WebSocket",
     };
   }
 
@@ -86,7 +95,9 @@ export class LiveLink {
     this.#heardAt = performance.now();
     let socket;
     try {
-      socket = new WebSocket(this.#url);
+      const scene = this.#core()?.liveScene();
+      this.#isMoq = this.#moq !== null && scene !== undefined;
+      socket = this.#isMoq ? new MoqSocket(this.#moq, scene, this.#bits) : new WebSocket(this.#url);
     } catch (error) {
       const message = `${this.#url} is no address of a live session: ${error.message}`;
       // Whoever makes this knows it only once it is made.
@@ -104,7 +115,16 @@ export class LiveLink {
       this.#pump();
     });
     socket.onmessage = ours((event) => this.#take(event.data));
-    socket.onclose = ours(() => this.#broke());
+    socket.onclose = ours(() => {
+      if (this.#isMoq && !this.#wasOpen && this.#url) {
+        // UDP may be closed to this viewer, and the page's own way open.
+        this.#moq = null;
+        this.#drop();
+        this.#connect();
+        return;
+      }
+      this.#broke();
+    });
   }
 
   #take(data) {
@@ -141,6 +161,7 @@ export class LiveLink {
     const core = this.#core();
     if (!core || !this.#socket) return;
     if (performance.now() - this.#heardAt > SILENCE && this.#mayBeGone(core)) {
+      if (!this.#wasOpen) this.#moq = null;
       this.#broke();
       return;
     }

@@ -17,7 +17,7 @@ const STAGES = {
 };
 const NUMBERS = ["time", "shadowResolution", "samples", "fade", "maxPixelRatio", "animation"];
 const FLAGS = ["paused", "loop"];
-const WORDS = ["scene", "stream", "live", "token", "backend", "method", "view", "camera"];
+const WORDS = ["scene", "stream", "live", "token", "transport", "backend", "method", "view", "camera"];
 
 const session = new SessionPanel();
 let viewer = null;

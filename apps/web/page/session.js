@@ -92,6 +92,7 @@ export class SessionPanel {
     byId("light-age").textContent = live.age === null ? "–" : milliseconds(1000 * live.age);
     const stages = { step: live.stepMs, queue: live.queueMs, network: live.networkMs, apply: live.applyMs };
     for (const [name, value] of Object.entries(stages)) byId(name).textContent = milliseconds(value);
+    byId("transport").textContent = live.transport;
     byId("behind").textContent = live.behind.toLocaleString("en");
     for (const row of document.querySelectorAll("#figures .live")) row.hidden = false;
     byId("age-row").hidden = true;

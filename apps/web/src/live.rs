@@ -44,6 +44,12 @@ impl Core {
         Ok(())
     }
 
+    /// The hash of the scene that was loaded, as hexadecimal digits; nothing without a session.
+    #[wasm_bindgen(js_name = liveScene)]
+    pub fn live_scene(&self) -> Option<String> {
+        self.live.as_ref().map(|live| live.guest.hello().scene)
+    }
+
     /// There is a connection.
     #[wasm_bindgen(js_name = liveConnected)]
     pub fn live_connected(&mut self, now_s: f64) {

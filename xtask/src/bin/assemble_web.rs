@@ -1,6 +1,6 @@
 //! Puts the page together: glue for the compiled program, the page's own files, and a check of the size.
 //!
-//! `assemble-web PROGRAM.wasm PAGE_FOLDER OUT_FOLDER`
+//! `assemble-web PROGRAMS_FOLDER PAGE_FOLDER OUT_FOLDER`
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -9,18 +9,16 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail};
 use wasm_bindgen_cli_support::Bindgen;
 
-/// Name of the glue (`.js`) and, with `_bg`, of the program (`.wasm`).
-const NAME: &str = "dapple_web";
-/// Most bytes of the program as a server sends it, compressed.
-const MAX_GZIPPED_BYTES: usize = 1_600_000;
+/// Names of the glue (`.js`) and, with `_bg`, of a program (`.wasm`), and most bytes of it as a server sends it, compressed.
+const PROGRAMS: [(&str, usize); 2] = [("dapple_web", 1_600_000), ("dapple_web_moq", 600_000)];
 
 fn main() -> ExitCode {
     let arguments: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
-    let [program, page, out] = arguments.as_slice() else {
-        eprintln!("assemble-web takes PROGRAM.wasm PAGE_FOLDER OUT_FOLDER");
+    let [programs, page, out] = arguments.as_slice() else {
+        eprintln!("assemble-web takes PROGRAMS_FOLDER PAGE_FOLDER OUT_FOLDER");
         return ExitCode::FAILURE;
     };
-    match assemble(program, page, out) {
+    match assemble(programs, page, out) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("{error:#}");
@@ -29,17 +27,20 @@ fn main() -> ExitCode {
     }
 }
 
-fn assemble(program: &Path, page: &Path, out: &Path) -> Result<()> {
+fn assemble(programs: &Path, page: &Path, out: &Path) -> Result<()> {
     std::fs::create_dir_all(out).with_context(|| format!("cannot make {}", out.display()))?;
-    let mut bindgen = Bindgen::new();
-    bindgen
-        .input_path(program)
-        .out_name(NAME)
-        .typescript(false)
-        .remove_name_section(true)
-        .remove_producers_section(true)
-        .web(true)?;
-    bindgen.generate(out).with_context(|| format!("cannot make the glue of {}", program.display()))?;
+    for (name, _) in PROGRAMS {
+        let program = programs.join(name).with_extension("wasm");
+        let mut bindgen = Bindgen::new();
+        bindgen
+            .input_path(&program)
+            .out_name(name)
+            .typescript(false)
+            .remove_name_section(true)
+            .remove_producers_section(true)
+            .web(true)?;
+        bindgen.generate(out).with_context(|| format!("cannot make the glue of {}", program.display()))?;
+    }
     for file in std::fs::read_dir(page).with_context(|| format!("cannot list {}", page.display()))? {
         let from = file?.path();
         if let (true, Some(name)) = (from.is_file(), from.file_name()) {
@@ -47,15 +48,17 @@ fn assemble(program: &Path, page: &Path, out: &Path) -> Result<()> {
                 .with_context(|| format!("cannot copy {}", from.display()))?;
         }
     }
-
-    let wasm = out.join(format!("{NAME}_bg.wasm"));
-    let (whole, gzipped) = size(&wasm)?;
-    println!("{}: {}, {} gzipped", wasm.display(), megabytes(whole), megabytes(gzipped));
-    if gzipped > MAX_GZIPPED_BYTES {
-        bail!(
-            "the page's program has {gzipped} bytes gzipped, more than {MAX_GZIPPED_BYTES}: look for what came in last \
-             (`cargo tree -p dapple-web --target wasm32-unknown-unknown`)"
-        );
+    for (name, most) in PROGRAMS {
+        let wasm = out.join(format!("{name}_bg.wasm"));
+        let (whole, gzipped) = size(&wasm)?;
+        println!("{}: {}, {} gzipped", wasm.display(), megabytes(whole), megabytes(gzipped));
+        if gzipped > most {
+            bail!(
+                "{name} has {gzipped} bytes gzipped, more than {most}: look for what came in last (`cargo tree -p {} --target \
+                 wasm32-unknown-unknown`)",
+                name.replace('_', "-")
+            );
+        }
     }
     Ok(())
 }

@@ -1,0 +1,87 @@
+// Pages that take part in a live session over WebTransport, and one beside them over a WebSocket.
+//
+// node moq.mjs PLAN.json, where the plan is
+//   { browser, url, port, out }
+// `url` is a server's, `port` one at which nobody answers UDP. Pictures of the windows go to out/NAME.png. A JSON object of facts is printed.
+
+import { readFile } from "node:fs/promises";
+import { join } from "node:path";
+
+import { launch } from "./launch.mjs";
+
+const PATIENCE_MS = 120_000;
+const COARSE = "shadowResolution=128&samples=1&maxPixelRatio=0.5&fade=0";
+
+const plan = JSON.parse(await readFile(process.argv[2], "utf8"));
+const facts = { errors: [] };
+const browser = await launch(plan.browser);
+try {
+  await run();
+} catch (error) {
+  facts.errors.push(`driver: ${error.stack}`);
+} finally {
+  await browser.close();
+}
+console.log(JSON.stringify(facts));
+
+async function run() {
+  const mover = await open("mover", `${plan.url}?${COARSE}`);
+  const looker = await open("looker", `${plan.url}?${COARSE}`);
+  const other = await open("other", `${plan.url}?transport=websocket&${COARSE}`);
+  const all = [mover, looker, other];
+  for (const tab of all) await until(tab, () => dapple.live.state === "live" && dapple.live.hasLight);
+  facts.transports = await Promise.all(all.map((tab) => tab.evaluate(() => dapple.live.transport)));
+  await until(mover, () => dapple.live.role === "interact");
+  const node = await mover.evaluate(() => dapple.instances?.[1]?.node ?? 1);
+  const goal = [0.1, 0.4, 0.2];
+  await mover.evaluate(([node, translation]) => dapple.moveNode(node, { translation }), [node, goal]);
+  for (const tab of [looker, other]) {
+    await until(tab, (node) => dapple.edits.placed.some((placed) => placed.node === node), node);
+  }
+  facts.placed = await Promise.all(all.map((tab) => tab.evaluate(() => dapple.edits.placed[0])));
+  facts.goal = goal;
+  await until(mover, () => !dapple.live.pending);
+  // What one pauses over a WebSocket stands still for all.
+  await other.evaluate(() => dapple.pause());
+  for (const tab of all) await until(tab, () => dapple.paused);
+  await mover.waitForTimeout(1500);
+  for (const [tab, name] of [[mover, "mover"], [looker, "looker"]]) {
+    await tab.screenshot({ path: join(plan.out, `window-${name}.png`) });
+  }
+  facts.text = await looker.innerText("#link");
+  facts.figures = await looker.evaluate(() => document.getElementById("transport").textContent);
+  facts.light = await Promise.all(all.map((tab) => tab.evaluate(() => dapple.stats.points)));
+
+  // UDP that leads nowhere: the page's own way is taken.
+  const walled = await open("walled", `${plan.url}?${COARSE}`, (json) => {
+    json.moq.url = `https://127.0.0.1:${plan.port}/`;
+    return json;
+  });
+  await until(walled, () => dapple.live.state === "live" && dapple.live.hasLight);
+  facts.walled = await walled.evaluate(() => dapple.live.transport);
+}
+
+async function open(name, url, change) {
+  const context = await browser.newContext({ viewport: { width: 960, height: 540 }, deviceScaleFactor: 1 });
+  const tab = await context.newPage();
+  if (change) {
+    await tab.route("**/viewer.json", async (route) => {
+      const response = await route.fetch();
+      await route.fulfill({ response, json: change(await response.json()) });
+    });
+  }
+  // That a connection cannot be made is said by the browser itself.
+  const expected = /WebTransport|QUIC|ERR_CONNECTION/;
+  tab.on("console", (line) => {
+    if (line.type() === "error" && !expected.test(line.text())) facts.errors.push(`${name}: ${line.text()}`);
+  });
+  tab.on("pageerror", (error) => facts.errors.push(`${name}: ${error.message}`));
+  await tab.goto(url);
+  await until(tab, () => globalThis.dapple || !document.getElementById("message").hidden);
+  if (await tab.isVisible("#message")) throw new Error(`${name}: ${await tab.innerText("#message")}`);
+  return tab;
+}
+
+function until(tab, what, argument) {
+  return tab.waitForFunction(what, argument, { timeout: PATIENCE_MS, polling: 100 });
+}
