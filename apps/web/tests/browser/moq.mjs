@@ -27,11 +27,15 @@ console.log(JSON.stringify(facts));
 async function run() {
   const mover = await open("mover", `${plan.url}?${COARSE}`);
   const looker = await open("looker", `${plan.url}?${COARSE}`);
+  for (const tab of [mover, looker]) await isLive(tab);
+  await until(mover, () => dapple.live.role === "interact");
+  // Time stands still for all, so that pages which draw in software come to rest.
+  await mover.evaluate(() => dapple.pause());
+  for (const tab of [mover, looker]) await until(tab, () => dapple.paused);
   const other = await open("other", `${plan.url}?transport=websocket&${COARSE}`);
   const all = [mover, looker, other];
-  for (const tab of all) await until(tab, () => dapple.live.state === "live" && dapple.live.hasLight);
+  await isLive(other);
   facts.transports = await Promise.all(all.map((tab) => tab.evaluate(() => dapple.live.transport)));
-  await until(mover, () => dapple.live.role === "interact");
   const node = await mover.evaluate(() => dapple.instances?.[1]?.node ?? 1);
   const goal = [0.1, 0.4, 0.2];
   await mover.evaluate(([node, translation]) => dapple.moveNode(node, { translation }), [node, goal]);
@@ -41,9 +45,9 @@ async function run() {
   facts.placed = await Promise.all(all.map((tab) => tab.evaluate(() => dapple.edits.placed[0])));
   facts.goal = goal;
   await until(mover, () => !dapple.live.pending);
-  // What one pauses over a WebSocket stands still for all.
-  await other.evaluate(() => dapple.pause());
-  for (const tab of all) await until(tab, () => dapple.paused);
+  // What is said over a WebSocket is heard over WebTransport.
+  await other.evaluate(() => dapple.seek(1.25));
+  for (const tab of all) await until(tab, () => Math.abs(dapple.time - 1.25) < 1e-3);
   await mover.waitForTimeout(1500);
   for (const [tab, name] of [[mover, "mover"], [looker, "looker"]]) {
     await tab.screenshot({ path: join(plan.out, `window-${name}.png`) });
@@ -57,7 +61,7 @@ async function run() {
     json.moq.url = `https://127.0.0.1:${plan.port}/`;
     return json;
   });
-  await until(walled, () => dapple.live.state === "live" && dapple.live.hasLight);
+  await isLive(walled);
   facts.walled = await walled.evaluate(() => dapple.live.transport);
 }
 
@@ -80,6 +84,10 @@ async function open(name, url, change) {
   await until(tab, () => globalThis.dapple || !document.getElementById("message").hidden);
   if (await tab.isVisible("#message")) throw new Error(`${name}: ${await tab.innerText("#message")}`);
   return tab;
+}
+
+async function isLive(tab) {
+  await until(tab, () => globalThis.dapple?.live?.state === "live" && dapple.live.hasLight);
 }
 
 function until(tab, what, argument) {
