@@ -42,7 +42,8 @@ const HOST_LINES: &str = r#"{"type":"welcome","protocol":1,"viewer":1,"key":"k",
 {"type":"heard","number":3}
 {"type":"rejected","number":4,"message":"no"}
 {"type":"status","viewers":2,"step_us":3,"queue_us":4,"round_trip_us":5,"ray_budget":6,"waiting":7}
-{"type":"refused","reason":"closing","message":"later"}"#;
+{"type":"refused","reason":"closing","message":"later"}
+{"protocol":1,"wire":4,"scene":"00","streams":[{},{"bits_per_s":500000}]}"#;
 
 /// What hosts and workers say to each other, one of each.
 const WORK_LINES: &str = r#"{"type":"hello","protocol":1,"wire":4,"scene":"00","shard":0,"of":2,"token":"t"}

@@ -66,6 +66,10 @@ pub fn live_session(data: &[u8]) {
                 let again = ToWorker::parse(&message.to_text()).expect("what was read can be written");
                 assert_eq!(again.to_text(), message.to_text());
             }
+            if let Ok(message) = dapple_moq::About::parse(text) {
+                assert!(message.stream_for(Some(1)) < message.streams.len());
+                assert_eq!(dapple_moq::About::parse(&message.to_text()).ok(), Some(message));
+            }
             let _ = victim.receive_text(text);
             assert!(victim.edits().check(&scene).is_ok(), "a viewer took edits that do not fit");
             if host.receive(link, text, now_us).is_err() {

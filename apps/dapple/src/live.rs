@@ -38,12 +38,24 @@ pub(crate) enum Address {
     /// At `ws://…`.
     Ws(String),
     /// Over MoQ, directly or through a relay.
-    Moq(MoqJson),
+    Moq(MoqPlace),
+}
+
+/// Where a session is over MoQ.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct MoqPlace {
+    /// As it was told.
+    pub(crate) json: MoqJson,
+    /// The folder of the viewer.json that told it, which is asked again after a connection has broken: a server that starts again has another name.
+    pub(crate) folder: String,
+    /// The relay that is used instead of what it says.
+    pub(crate) relay: Option<String>,
 }
 
 impl Address {
-    /// The session that a folder's viewer.json names; over MoQ if that is wanted: at a relay's address, or (an empty one) where the folder says.
+    /// The session that the viewer.json in a folder names; over MoQ if that is wanted: at a relay's address, or (an empty one) where the folder says.
     pub(crate) fn choose(
+        folder: &str,
         live: Option<String>,
         moq: Option<MoqJson>,
         relay: Option<&str>,
@@ -52,12 +64,35 @@ impl Address {
         if cfg!(not(feature = "moq")) {
             bail!("--moq: this program was built without MoQ: cargo build --release --features moq");
         }
-        let moq = moq.context("--moq: what is served there is not served over MoQ (dapple serve --moq)")?;
-        Ok(Some(Address::Moq(match relay {
-            "" => moq,
-            // A relay has a certificate of its own.
-            url => MoqJson { url: url.to_owned(), certificate: None, ..moq },
-        })))
+        let json = moq.context("--moq: what is served there is not served over MoQ (dapple serve --moq)")?;
+        let relay = (!relay.is_empty()).then(|| relay.to_owned());
+        Ok(Some(Address::Moq(MoqPlace { json, folder: folder.to_owned(), relay }.by_relay())))
+    }
+
+    /// The same after the connection has broken.
+    #[cfg(feature = "moq")]
+    async fn again(&mut self) -> Result<()> {
+        let Address::Moq(place) = self else { return Ok(()) };
+        let folder = place.folder.clone();
+        let json = tokio::task::spawn_blocking(move || crate::view::fetch_moq(&folder)).await??;
+        place.json = json.context("the server serves no MoQ any more")?;
+        *place = place.clone().by_relay();
+        Ok(())
+    }
+
+    #[cfg(not(feature = "moq"))]
+    async fn again(&mut self) -> Result<()> {
+        Ok(())
+    }
+}
+
+impl MoqPlace {
+    fn by_relay(mut self) -> MoqPlace {
+        if let Some(relay) = &self.relay {
+            // It has a certificate of its own.
+            (self.json.url, self.json.certificate) = (relay.clone(), None);
+        }
+        self
     }
 }
 
@@ -90,9 +125,16 @@ pub(crate) async fn keep(
     mut stop: watch::Receiver<bool>,
     mut on_news: impl FnMut(&mut Guest, News) + Send,
 ) {
+    let mut address = address.clone();
+    let mut is_first = true;
     loop {
         state.send_replace(LinkState::Connecting);
-        let ended = converse(address, shared, state, &mut stop, &mut on_news).await;
+        let known = if is_first { Ok(()) } else { address.again().await };
+        is_first = false;
+        let ended = match known {
+            Ok(()) => converse(&address, shared, state, &mut stop, &mut on_news).await,
+            Err(error) => Ended::Broken(format!("{error:#}")),
+        };
         let wait_us = shared.lock().disconnected();
         let reason = match ended {
             Ended::Broken(reason) => reason,
@@ -138,9 +180,9 @@ async fn converse(
             converse_over(connecting, shared, state, stop, on_news).await
         }
         #[cfg(feature = "moq")]
-        Address::Moq(address) => {
+        Address::Moq(place) => {
             let hello = shared.lock().hello();
-            let connecting = moq::connect(address, &hello);
+            let connecting = moq::connect(&place.json, &hello);
             converse_over(connecting, shared, state, stop, on_news).await
         }
         #[cfg(not(feature = "moq"))]

@@ -102,7 +102,10 @@ fn pages_over_webtransport_see_what_those_over_a_websocket_see() {
     assert_eq!(facts["placed"][0], facts["placed"][2], "{facts:#}");
     assert_eq!(facts["figures"], "WebTransport");
     assert!(facts["text"].as_str().unwrap().contains("live"), "{facts:#}");
-    assert!(facts["light"][0].as_u64().unwrap() > 1000 && facts["light"][0] == facts["light"][2], "{facts:#}");
+    assert!(
+        facts["light"][0].as_u64().unwrap() > 1000 && facts["light"][0] == facts["light"][2],
+        "{facts:#}"
+    );
     assert_eq!(facts["walled"], "WebSocket", "{facts:#}");
 }
 

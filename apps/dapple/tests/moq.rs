@@ -409,6 +409,109 @@ fn what_cannot_be_is_said_clearly() {
     fail(folder.path(), &["view", "--url", &url, "--moq", "--headless"], &["--moq", "dapple serve --moq"]);
 }
 
+/// A way for datagrams that loses, doubles, delays and overtakes them, and carries only so much: from a seed.
+struct BadWay {
+    port: u16,
+    lost: Arc<std::sync::atomic::AtomicU32>,
+    task: tokio::task::JoinHandle<()>,
+}
+
+impl BadWay {
+    /// Loss 5 %, 2 % twice, 20 to 120 ms, 2 Mbit/s with a queue of 200 ms, in both directions; for one viewer.
+    async fn to(target: u16, seed: u64) -> BadWay {
+        use std::sync::atomic::{AtomicU32, Ordering};
+        let near = Arc::new(tokio::net::UdpSocket::bind("127.0.0.1:0").await.unwrap());
+        let far = Arc::new(tokio::net::UdpSocket::bind("127.0.0.1:0").await.unwrap());
+        far.connect(("127.0.0.1", target)).await.unwrap();
+        let port = near.local_addr().unwrap().port();
+        let lost = Arc::new(AtomicU32::new(0));
+        let count = lost.clone();
+        let task = tokio::spawn(async move {
+            let mut state = seed;
+            let mut viewer = None;
+            let mut free_at = [Instant::now(); 2];
+            let (mut up, mut down) = (vec![0; 2048], vec![0; 2048]);
+            loop {
+                let (way, bytes) = tokio::select! {
+                    came = near.recv_from(&mut up) => {
+                        let Ok((length, from)) = came else { continue };
+                        viewer = Some(from);
+                        (0, up[..length].to_vec())
+                    }
+                    came = far.recv(&mut down) => match came {
+                        Ok(length) => (1, down[..length].to_vec()),
+                        Err(_) => continue,
+                    }
+                };
+                let mut random = || {
+                    state =
+                        state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                    (state >> 33) as u32 % 100
+                };
+                let now = Instant::now();
+                let free = free_at[way].max(now);
+                if random() < 5 || free > now + Duration::from_millis(200) {
+                    count.fetch_add(1, Ordering::Relaxed);
+                    continue;
+                }
+                free_at[way] = free + Duration::from_secs_f64(bytes.len() as f64 / 250_000.0);
+                for _ in 0..1 + u32::from(random() < 2) {
+                    let due = free_at[way] + Duration::from_millis(u64::from(20 + random()));
+                    let (near, far, bytes, viewer) = (near.clone(), far.clone(), bytes.clone(), viewer);
+                    tokio::spawn(async move {
+                        tokio::time::sleep_until(due.into()).await;
+                        let _ = match (way, viewer) {
+                            (0, _) => far.send(&bytes).await,
+                            (_, Some(viewer)) => near.send_to(&bytes, viewer).await,
+                            _ => Ok(0),
+                        };
+                    });
+                }
+            }
+        });
+        BadWay { port, lost, task }
+    }
+}
+
+impl Drop for BadWay {
+    fn drop(&mut self) {
+        self.task.abort();
+    }
+}
+
+#[test]
+fn over_a_bad_way_and_after_a_stall_the_light_is_the_same() {
+    let folder = TempDir::new().unwrap();
+    let served = Served::start(folder.path(), 0, &["--moq", "--threshold", "0"]);
+    let (at, scene) = (At::of(&served), served.scene());
+    let port = at.url.trim_end_matches('/').rsplit(':').next().unwrap().parse().unwrap();
+    let mut oracle = Viewer::join(served.port, &scene, config(1));
+    oracle.until("the first light", Viewer::has_light);
+    runtime().block_on(async {
+        let way = BadWay::to(port, 7).await;
+        let bad = At { url: format!("https://127.0.0.1:{}/", way.port), ..at.clone() };
+        let mut shaky = MoqViewer::join(&bad, &scene, config(2)).await;
+        let mut stalled = MoqViewer::join(&at, &scene, config(3)).await;
+        for viewer in [&mut shaky, &mut stalled] {
+            viewer.until("the first light", MoqViewer::has_light).await;
+            viewer.until("it may change things", |v| v.guest.role() == Some(Role::Interact)).await;
+        }
+        assert!(shaky.guest.send(place(scene.instances[1].node, 0.3)));
+        // One takes nothing, while the other goes on.
+        let start = Instant::now();
+        while start.elapsed() < Duration::from_secs(6) {
+            oracle.run(Duration::from_millis(10));
+            shaky.talk().await;
+        }
+        shaky.until("its event is answered", |v| !v.guest.has_pending()).await;
+        assert!(oracle.guest.send(Event::Pause));
+        oracle.until("the event is answered", |v| !v.guest.has_pending());
+        settle(&mut oracle, &mut [&mut shaky, &mut stalled]).await;
+        let lost = way.lost.load(std::sync::atomic::Ordering::Relaxed);
+        assert!(lost > 10, "the way was bad: {lost} datagrams lost");
+    });
+}
+
 /// A relay as it comes, if it is installed.
 struct Relay {
     child: Child,

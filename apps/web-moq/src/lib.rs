@@ -47,7 +47,8 @@ impl MoqLink {
         let (words, said) = mpsc::unbounded();
         let wish = Wish { scene, viewer, bits_per_s: bits_per_s.map(|bits| bits as u64) };
         spawn_local(async move {
-            let ended = converse(&url, &name, certificate.as_deref(), &wish, said, &on_open, &on_message).await;
+            let ended =
+                converse(&url, &name, certificate.as_deref(), &wish, said, &on_open, &on_message).await;
             let reason = ended.err().map_or(String::new(), |error| error.to_string());
             // If the page's function throws there is nobody to tell.
             let _ = on_close.call1(&JsValue::NULL, &reason.into());
@@ -75,7 +76,8 @@ async fn converse(
     on_open: &Function,
     on_message: &Function,
 ) -> Result<(), LinkError> {
-    let url: Url = url.parse().map_err(|error| LinkError::Refused(format!("{url} is no address: {error}")))?;
+    let url: Url =
+        url.parse().map_err(|error| LinkError::Refused(format!("{url} is no address: {error}")))?;
     let names = Names::new(name)?;
     let client = web_transport_wasm::ClientBuilder::new().with_protocols(PROTOCOLS);
     let client = match certificate {
@@ -132,5 +134,8 @@ fn bytes(hex: &str) -> Result<Vec<u8>, LinkError> {
     if !hex.is_ascii() || hex.len() != 64 {
         return Err(refused());
     }
-    (0..hex.len()).step_by(2).map(|at| u8::from_str_radix(&hex[at..at + 2], 16).map_err(|_| refused())).collect()
+    (0..hex.len())
+        .step_by(2)
+        .map(|at| u8::from_str_radix(&hex[at..at + 2], 16).map_err(|_| refused()))
+        .collect()
 }

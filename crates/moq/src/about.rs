@@ -32,7 +32,11 @@ pub struct Stream {
 }
 
 impl About {
-    pub(crate) fn parse(text: &str) -> Result<About, LinkError> {
+    /// Reads what a host says of itself.
+    ///
+    /// # Errors
+    /// It is not understood, or offers no stream or too many.
+    pub fn parse(text: &str) -> Result<About, LinkError> {
         let about: About = serde_json::from_str(text)
             .map_err(|error| LinkError::Refused(format!("what the host says of itself: {error}")))?;
         if about.streams.is_empty() || about.streams.len() > MAX_STREAMS {
@@ -41,15 +45,42 @@ impl About {
         Ok(about)
     }
 
-    #[cfg(feature = "host")]
-    pub(crate) fn to_text(&self) -> String {
+    /// As it is said.
+    pub fn to_text(&self) -> String {
         serde_json::to_string(self).expect("numbers and texts are JSON")
     }
 
     /// The richest stream within a wish, or else the leanest.
-    pub(crate) fn stream_for(&self, bits_per_s: Option<u64>) -> usize {
+    /// Its number.
+    pub fn stream_for(&self, bits_per_s: Option<u64>) -> usize {
         let Some(wish) = bits_per_s else { return 0 };
         let within = |stream: &Stream| stream.bits_per_s.is_some_and(|bits| bits <= wish);
         self.streams.iter().position(within).unwrap_or(self.streams.len() - 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn about(streams: &[Option<u64>]) -> About {
+        let streams = streams.iter().map(|bits_per_s| Stream { bits_per_s: *bits_per_s }).collect();
+        About { protocol: 1, wire: 4, scene: "00".repeat(32), streams }
+    }
+
+    #[test]
+    fn what_is_said_is_understood() {
+        let said = about(&[None, Some(2_000_000), Some(500_000)]);
+        assert_eq!(About::parse(&said.to_text()).unwrap(), said);
+        assert!(About::parse(&about(&[]).to_text()).is_err());
+        assert!(About::parse(&about(&[None; 9]).to_text()).is_err());
+        assert!(About::parse("{}").is_err());
+    }
+
+    #[test]
+    fn a_wish_gets_the_richest_stream_within_it() {
+        let said = about(&[None, Some(2_000_000), Some(500_000)]);
+        let chosen = [None, Some(3_000_000), Some(1_000_000), Some(1)].map(|wish| said.stream_for(wish));
+        assert_eq!(chosen, [0, 1, 2, 2]);
     }
 }

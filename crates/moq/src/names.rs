@@ -66,11 +66,6 @@ impl Names {
         &self.base
     }
 
-    /// Where viewers' broadcasts are.
-    pub fn inbox(&self) -> String {
-        format!("{}/in", self.base)
-    }
-
     /// What a viewer says.
     pub fn from_viewer(&self, viewer: &str) -> String {
         format!("{}/in/{viewer}", self.base)
@@ -111,4 +106,33 @@ fn patterns(texts: &[String]) -> Result<Patterns, LinkError> {
 /// Whether this can be a viewer's name: hexadecimal digits, 32 to 64 of them, so that nobody guesses it.
 pub(crate) fn is_viewer(name: &str) -> bool {
     (32..=MAX_VIEWER).contains(&name.len()) && name.bytes().all(|byte| byte.is_ascii_hexdigit())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_bounded_and_patterns_tell_whose_they_are() {
+        for name in ["a", "dapple/room-1", "a/b.c_d"] {
+            assert_eq!(check_name(name), Ok(()));
+        }
+        for name in
+            ["", "/", "a/", "/a", "a//b", "a b", "a/*", "**", "ä", &"a".repeat(201), &["a"; 17].join("/")]
+        {
+            assert!(check_name(name).is_err(), "{name}");
+        }
+        let names = Names::new("dapple/room").unwrap();
+        let (readable, writable) = (names.readable().unwrap(), names.writable().unwrap());
+        assert!(readable.matches("dapple/room") && readable.matches(&names.to_viewer("ab")));
+        assert!(!readable.matches(&names.from_viewer("ab")) && !readable.matches("dapple"));
+        assert!(writable.matches(&names.from_viewer("ab")) && !writable.matches(&names.to_viewer("ab")));
+        assert!(!writable.matches("dapple/room") && !writable.matches("dapple/room/in/a/b"));
+    }
+
+    #[test]
+    fn viewers_names_cannot_be_guessed() {
+        assert!(is_viewer(&"0f".repeat(16)) && is_viewer(&"A".repeat(64)));
+        assert!(!is_viewer(&"0f".repeat(15)) && !is_viewer(&"g".repeat(32)) && !is_viewer(&"0".repeat(65)));
+    }
 }

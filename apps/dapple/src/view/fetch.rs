@@ -35,11 +35,16 @@ pub(super) struct Fetched {
 /// The next bytes, or why there are no more; the channel closes after the last.
 pub(super) type Piece = Result<Vec<u8>, String>;
 
+/// A folder's viewer.json.
+pub(super) fn fetch_json(url: &str) -> Result<ViewerJson> {
+    let address = resolve(url, FILE_NAME)?;
+    ViewerJson::parse(&get_all(&address, MAX_JSON_BYTES)?).with_context(|| address.clone())
+}
+
 /// Fetches what the folder's viewer.json names.
 pub(super) fn fetch(url: &str) -> Result<Fetched> {
     let json_address = resolve(url, FILE_NAME)?;
-    let json =
-        ViewerJson::parse(&get_all(&json_address, MAX_JSON_BYTES)?).with_context(|| json_address.clone())?;
+    let json = fetch_json(url)?;
     let scene_address = resolve(url, &json.scene)?;
     let bar = Bar::spinner(&format!("fetching {scene_address}"));
     let bytes = get_all(&scene_address, MAX_SCENE_BYTES)?;

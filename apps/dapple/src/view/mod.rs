@@ -41,7 +41,13 @@ const DEFAULT_HZ: f64 = 15.0;
 /// The scene that a folder's viewer.json names, and where its live session is: over MoQ if that is asked for ([`Address::choose`]).
 pub(crate) fn fetch_scene(url: &str, moq: Option<&str>) -> Result<(dapple_scene::Scene, Option<Address>)> {
     let fetched = fetch::fetch(url)?;
-    Ok((fetched.scene, Address::choose(fetched.live, fetched.moq, moq)?))
+    Ok((fetched.scene, Address::choose(url, fetched.live, fetched.moq, moq)?))
+}
+
+/// Where the session of a folder's viewer.json is over MoQ.
+#[cfg(feature = "moq")]
+pub(crate) fn fetch_moq(url: &str) -> Result<Option<crate::page::MoqJson>> {
+    Ok(fetch::fetch_json(url)?.moq)
 }
 
 /// Shows what the arguments name.
@@ -101,7 +107,7 @@ fn open(args: &ViewArgs) -> Result<Opening> {
         Some(url) => {
             let fetched = fetch::fetch(url)?;
             let scene = Arc::new(fetched.scene);
-            let live = Address::choose(fetched.live, fetched.moq, args.moq.as_deref())?;
+            let live = Address::choose(url, fetched.live, fetched.moq, args.moq.as_deref())?;
             let feed = match (live, fetched.stream) {
                 (Some(address), _) => {
                     let bits_per_s = args.step.budget.map(|rate| rate.0);

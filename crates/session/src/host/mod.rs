@@ -4,6 +4,7 @@ mod access;
 mod bucket;
 mod groups;
 mod ladder;
+mod pace;
 mod queue;
 mod shared;
 mod state;
@@ -26,7 +27,6 @@ use viewer::Viewer;
 
 use crate::{
     Event, FromHost, FromViewer, Held, Hello, LookCamera, PROTOCOL, Reason, Refusal, Role, SceneClock,
-    Welcome,
 };
 
 /// Most ages kept between two questions.
@@ -171,19 +171,7 @@ impl Host {
         let Admission { role, rung, held, goes_on } = admission;
         let viewer = self.viewers.get_mut(&id).expect("whoever is admitted has a place");
         viewer.connect(role, rung, held, arrival, now_us);
-        viewer.tell(&FromHost::Welcome(Welcome {
-            protocol: PROTOCOL,
-            viewer: id,
-            key: viewer.key.clone(),
-            role,
-            hz: self.config.hz,
-            heard: viewer.events_done,
-            goes_on,
-            bits_per_s: self.config.rungs[rung],
-            events_per_s: self.config.events_per_s,
-            clock_us: now_us,
-            unix_us: arrival.unix_us,
-        }));
+        viewer.welcome(id, goes_on, &self.config, now_us);
         Link { viewer: id, connection: viewer.connection }
     }
 
@@ -340,6 +328,10 @@ impl Host {
             viewer.state_sent = self.state.version();
             self.counts.bytes += message.len() as u64;
             return Next::Send(Outgoing::Text(message));
+        }
+        if viewer.change_stream(self.rungs.len() - 1, now_us) {
+            viewer.welcome(link.viewer, false, &self.config, now_us);
+            return self.next(link, now_us);
         }
         let rung = &mut self.rungs[viewer.rung];
         let Some(bytes) = viewer.next_light(rung, self.tick.as_ref(), &mut self.counts, &self.config, now_us)

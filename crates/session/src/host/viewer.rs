@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use super::bucket::Bucket;
 use super::ladder::{Entry, Rung, Step};
+use super::pace::Pace;
 use super::{Arrival, HostConfig, HostCounts};
-use crate::{FromHost, Held, Look, LookCamera, Reason, Refusal, Role, Status};
+use crate::{FromHost, Held, Look, LookCamera, PROTOCOL, Reason, Refusal, Role, Status, Welcome};
 
 /// Most texts that wait to be sent; a viewer that lets more pile up is let go.
 const MAX_WAITING_TEXTS: usize = 256;
@@ -52,6 +53,11 @@ pub(super) struct Viewer {
     /// Version of the state that it was sent last.
     pub(super) state_sent: u64,
     pub(super) rung: usize,
+    /// The rung that it asked for.
+    asked: usize,
+    pace: Pace,
+    /// When it came, by the calendar and by the host's clock, microseconds.
+    came_us: (u64, u64),
     light: Sent,
     look_number: u64,
     status_us: u64,
@@ -102,6 +108,9 @@ impl Viewer {
             expelled: None,
             state_sent: 0,
             rung: 0,
+            asked: 0,
+            pace: Pace::new(now_us),
+            came_us: (0, now_us),
             light: Sent::default(),
             look_number: 0,
             status_us: now_us,
@@ -123,6 +132,7 @@ impl Viewer {
         self.shares = arrival.shares;
         self.connection = self.connection.wrapping_add(1);
         (self.role, self.rung, self.left_us, self.expelled) = (role, rung, None, None);
+        (self.asked, self.pace, self.came_us) = (rung, Pace::new(now_us), (arrival.unix_us, now_us));
         (self.last_message_us, self.state_sent) = (now_us, 0);
         if is_reliable {
             // Nothing of an earlier connection comes after this.
@@ -147,6 +157,34 @@ impl Viewer {
     /// Whether the scene's state is told over its connection.
     pub(super) fn is_told_state(&self) -> bool {
         self.is_observer || !self.shares
+    }
+
+    /// Puts it into a stream that suits its link better, if there is one; its light begins anew.
+    pub(super) fn change_stream(&mut self, leanest: usize, now_us: u64) -> bool {
+        if !self.takes_light() || self.light.sending.is_some() {
+            return false;
+        }
+        let Some(rung) = self.pace.better(self.rung, self.asked, leanest, now_us) else { return false };
+        (self.rung, self.light.held) = (rung, None);
+        true
+    }
+
+    /// What it is told as it comes, or as its stream changes.
+    pub(super) fn welcome(&mut self, id: u64, goes_on: bool, config: &HostConfig, now_us: u64) {
+        let (unix_us, since_us) = self.came_us;
+        self.tell(&FromHost::Welcome(Welcome {
+            protocol: PROTOCOL,
+            viewer: id,
+            key: self.key.clone(),
+            role: self.role,
+            hz: config.hz,
+            heard: self.events_done,
+            goes_on,
+            bits_per_s: config.rungs[self.rung],
+            events_per_s: config.events_per_s,
+            clock_us: now_us,
+            unix_us: unix_us + now_us.saturating_sub(since_us),
+        }));
     }
 
     /// Lets it go: its connection learns why when it asks what to do next.
@@ -218,6 +256,7 @@ impl Viewer {
             }
         }
         self.light.heard(look, now_us);
+        self.pace.has_light |= look.held.is_some();
         // A stamp of the future is none of ours.
         let passed_us = now_us.checked_sub(look.heard_us).filter(|_| look.heard_us > 0)?;
         let round_us = passed_us.checked_sub(look.waited_us)?;
@@ -253,7 +292,9 @@ impl Viewer {
             light.give(&message, now_us);
             return Some(message);
         }
-        if light.is_congested(config.window_us, now_us) {
+        let is_full = light.is_congested(config.window_us, now_us);
+        self.pace.note(is_full, now_us);
+        if is_full {
             return None;
         }
         let entry = match rung.step(light.held, light.is_reliable) {

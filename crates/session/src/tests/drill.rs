@@ -39,6 +39,9 @@ pub(super) struct Drill {
     pub(super) scene: Arc<Scene>,
     pub(super) host: Host,
     pub(super) publisher: Publisher,
+    /// Of the leaner stream, which has every eighth update.
+    pub(super) lean: Publisher,
+    ticks: u64,
     pub(super) store: PointStore,
     pub(super) peers: Vec<Peer>,
     pub(super) now_us: u64,
@@ -60,6 +63,8 @@ impl Drill {
         let mut drill = Drill {
             host: Host::new(scene.clone(), host_config.clone(), 0),
             publisher: publisher(&scene, 1),
+            lean: publisher(&scene, 1),
+            ticks: 0,
             scene,
             store,
             peers: Vec::new(),
@@ -71,6 +76,7 @@ impl Drill {
             host_config,
         };
         drill.publisher.publish(&drill.store);
+        drill.lean.publish(&drill.store);
         drill
     }
 
@@ -118,6 +124,8 @@ impl Drill {
         self.host = Host::new(self.scene.clone(), self.host_config.clone(), 0);
         self.publisher = publisher(&self.scene, self.hosts * 1000);
         self.publisher.publish(&self.store);
+        self.lean = publisher(&self.scene, self.hosts * 1000);
+        self.lean.publish(&self.store);
     }
 
     /// Lets time pass until the next update, and makes it.
@@ -157,9 +165,18 @@ impl Drill {
         self.store.apply(&changes).unwrap();
         let frame = self.publisher.publish(&self.store);
         self.host.publish(0, &tick, frame.as_ref(), host_us);
-        if self.host.wants_snapshot(0) {
-            let snapshot = self.publisher.join().unwrap();
-            self.host.put_snapshot(0, &tick, &snapshot, host_us);
+        self.ticks += 1;
+        let has_lean = self.host.config().rungs.len() > 1;
+        if has_lean && self.ticks.is_multiple_of(8) {
+            let frame = self.lean.publish(&self.store);
+            self.host.publish(1, &tick, frame.as_ref(), host_us);
+        }
+        for (rung, publisher) in
+            [&self.publisher, &self.lean].into_iter().enumerate().take(1 + usize::from(has_lean))
+        {
+            if self.host.wants_snapshot(rung) {
+                self.host.put_snapshot(rung, &tick, &publisher.join().unwrap(), host_us);
+            }
         }
         self.host.end_step(&tick, host_us, Status::default());
     }
@@ -250,12 +267,14 @@ impl Drill {
 
     /// What every viewer must hold after the links have been quiet for a while.
     pub(super) fn check(&self, peer: usize) -> Result<(), String> {
-        let published = self.publisher.store().unwrap();
         let peer = &self.peers[peer];
+        let is_lean = peer.guest.welcome().is_some_and(|welcome| welcome.bits_per_s.is_some());
+        let publisher = if is_lean { &self.lean } else { &self.publisher };
+        let published = publisher.store().unwrap();
         let Some(held) = peer.subscriber.store() else { return Err("it holds nothing".into()) };
         if held.visibility() != published.visibility() {
             let epochs = (peer.subscriber.group(), peer.subscriber.epoch());
-            let newest = (self.publisher.group(), self.publisher.epoch());
+            let newest = (publisher.group(), publisher.epoch());
             return Err(format!("its light differs: {epochs:?} of {newest:?}"));
         }
         let (version, clock, edits) = self.host.state();

@@ -125,6 +125,32 @@ fn a_slow_viewer_is_never_far_behind_and_nothing_queues() {
 }
 
 #[test]
+fn a_slow_viewer_gets_a_leaner_stream_and_the_richer_one_when_its_link_is_wide_again() {
+    let rungs = vec![None, Some(100_000)];
+    let mut drill = Drill::new(20_000, HostConfig { rungs, ..HostConfig::default() }, 4);
+    drill.churn = 3000;
+    let slow = drill.add_peer(Faults { bytes_per_s: 60_000, ..tcp() });
+    let fast = drill.add_peer(tcp());
+    let bits = |drill: &Drill, peer: usize| drill.peers[peer].guest.welcome().unwrap().bits_per_s;
+    drill.run(3.0);
+    assert_eq!((bits(&drill, slow), bits(&drill, fast)), (None, None));
+    drill.run(27.0);
+    assert_eq!((bits(&drill, slow), bits(&drill, fast)), (Some(100_000), None));
+    assert!(drill.peers[slow].guest.age_s(drill.now_us).unwrap() < 2.0);
+    assert!(drill.peers[slow].guest.send(moved(1.0)));
+    drill.run(2.0);
+    drill.peers[slow].down.set_width(0);
+    drill.run(70.0);
+    assert_eq!((bits(&drill, slow), bits(&drill, fast)), (None, None));
+    settle(&mut drill);
+    for peer in [slow, fast] {
+        drill.check(peer).unwrap();
+    }
+    assert_eq!(drill.peers[fast].snapshots, 1, "the other notices nothing");
+    assert_eq!(drill.host.counts().events, 1);
+}
+
+#[test]
 fn a_viewer_that_comes_back_goes_on_where_it_was() {
     let mut drill = Drill::new(20_000, HostConfig::default(), 5);
     let peer = drill.add_peer(tcp());

@@ -77,6 +77,11 @@ impl<M: Clone> FaultyLink<M> {
         }
     }
 
+    /// From now on so many bytes a second fit through; 0 for any number.
+    pub(super) fn set_width(&mut self, bytes_per_s: u64) {
+        self.faults.bytes_per_s = bytes_per_s;
+    }
+
     /// Whether it takes another message now.
     pub(super) fn has_room(&self, now_us: u64) -> bool {
         self.busy_until_us <= now_us + BUFFER_US
