@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 #[cfg(all(unix, feature = "moq"))]
-use common::live::Served;
+use common::{live::Served, relay::Relay};
 use serde_json::{Value, json};
 
 /// Node.js, the browser, the driver's script and the built page.
@@ -89,12 +89,17 @@ fn folder_of(name: &str) -> PathBuf {
 fn pages_over_webtransport_see_what_those_over_a_websocket_see() {
     let Some([node, browser, driver, page]) = tools() else { return };
     let folder = folder_of("moq-page");
-    let served = Served::start(&folder, 0, &["--moq", "--page", page.to_str().unwrap()]);
+    let relay = Relay::start(&folder, None);
+    let mut arguments = vec!["--moq", "--page", page.to_str().unwrap()];
+    if let Some(relay) = &relay {
+        arguments.extend(["--relay", &relay.url]);
+    }
+    let served = Served::start(&folder, 0, &arguments);
     // Nobody answers there: it is held, and not listened to.
     let dead = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
     let plan = json!({
         "browser": browser, "url": format!("http://127.0.0.1:{}/", served.port), "out": folder,
-        "port": dead.local_addr().unwrap().port(),
+        "port": dead.local_addr().unwrap().port(), "relay": relay.as_ref().map(|relay| &relay.url),
     });
     let facts = drive(&node, &driver.with_file_name("moq.mjs"), &folder, &plan);
     assert_eq!(facts["transports"], json!(["WebTransport", "WebTransport", "WebSocket"]), "{facts:#}");
@@ -107,6 +112,9 @@ fn pages_over_webtransport_see_what_those_over_a_websocket_see() {
         "{facts:#}"
     );
     assert_eq!(facts["walled"], "WebSocket", "{facts:#}");
+    if relay.is_some() {
+        assert_eq!(facts["relayed"], json!(["WebTransport", facts["light"][0]]), "{facts:#}");
+    }
 }
 
 #[test]

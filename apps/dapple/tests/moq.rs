@@ -4,12 +4,12 @@
 
 mod common;
 
-use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use common::command::fail;
 use common::live::{Served, Viewer};
+use common::relay::Relay;
 use dapple_moq::moq_net::{Timestamp, origin};
 use dapple_moq::{LinkError, Message, Names, ViewerIn, ViewerOut, Wish};
 use dapple_scene::{Edit, Placement, Scene};
@@ -512,65 +512,11 @@ fn over_a_bad_way_and_after_a_stall_the_light_is_the_same() {
     });
 }
 
-/// A relay as it comes, if it is installed.
-struct Relay {
-    child: Child,
-    url: String,
-}
-
-impl Relay {
-    /// Starts one that dials `up`, if that is given; `None` where there is none to be had.
-    fn start(folder: &TempDir, up: Option<&str>) -> Option<Relay> {
-        let built = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/relay/bin/moq-relay");
-        let program = std::env::var_os("MOQ_RELAY").map_or(built, Into::into);
-        if !program.is_file() {
-            assert!(
-                std::env::var_os("REQUIRE_MOQ_RELAY").is_none_or(|value| value.is_empty() || value == "0"),
-                "{} is missing: cargo xtask relay",
-                program.display()
-            );
-            println!("skipped: {} is missing: cargo xtask relay", program.display());
-            return None;
-        }
-        // Free for UDP and TCP alike, until it takes both.
-        let port = loop {
-            let tcp = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
-            let port = tcp.local_addr().unwrap().port();
-            if std::net::UdpSocket::bind(("127.0.0.1", port)).is_ok() {
-                break port;
-            }
-        };
-        let listen = format!("127.0.0.1:{port}");
-        let log = std::fs::File::create(folder.path().join(format!("relay-{port}.log"))).unwrap();
-        let mut command = Command::new(program);
-        command.args(["--listen", &listen, "--listen-tls-generate", "localhost,127.0.0.1"]);
-        command.args(["--web-http-listen", &listen, "--auth-public", "**"]);
-        if let Some(up) = up {
-            command.args(["--cluster-connect", up]);
-        }
-        let child =
-            command.stdin(Stdio::null()).stdout(log.try_clone().unwrap()).stderr(log).spawn().unwrap();
-        let start = Instant::now();
-        while std::net::TcpStream::connect(&listen).is_err() {
-            assert!(start.elapsed() < Duration::from_secs(20), "the relay does not listen on {listen}");
-            std::thread::sleep(Duration::from_millis(50));
-        }
-        Some(Relay { child, url: format!("http://{listen}/") })
-    }
-}
-
-impl Drop for Relay {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
 #[test]
 fn two_relays_in_a_chain_carry_the_same_bytes() {
     let folder = TempDir::new().unwrap();
-    let Some(first) = Relay::start(&folder, None) else { return };
-    let Some(second) = Relay::start(&folder, Some(&first.url)) else { return };
+    let Some(first) = Relay::start(folder.path(), None) else { return };
+    let Some(second) = Relay::start(folder.path(), Some(&first.url)) else { return };
     let served = Served::start(
         folder.path(),
         0,

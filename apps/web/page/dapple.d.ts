@@ -125,7 +125,7 @@ export interface Picked {
 
 /** A live session over Media over QUIC, as viewer.json names it. */
 export interface MoqPlace {
-  /** Address of the server or of a relay, `https:`. */
+  /** Address of the server or of a relay, `https:`; or `http:` of a relay that tells the hash of its certificate there. */
   url: string;
   /** Name of the server's broadcast. */
   name: string;

@@ -7,6 +7,7 @@ pub(crate) mod command;
 pub(crate) mod http;
 pub(crate) mod live;
 pub(crate) mod made;
+pub(crate) mod relay;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -1,8 +1,8 @@
 // Pages that take part in a live session over WebTransport, and one beside them over a WebSocket.
 //
 // node moq.mjs PLAN.json, where the plan is
-//   { browser, url, port, out }
-// `url` is a server's, `port` one at which nobody answers UDP. Pictures of the windows go to out/NAME.png. A JSON object of facts is printed.
+//   { browser, url, port, relay, out }
+// `url` is a server's, `port` one at which nobody answers UDP, `relay` the address of a relay that has the session, or null. Pictures of the windows go to out/NAME.png. A JSON object of facts is printed.
 
 import { readFile } from "node:fs/promises";
 import { join } from "node:path";
@@ -63,6 +63,15 @@ async function run() {
   });
   await isLive(walled);
   facts.walled = await walled.evaluate(() => dapple.live.transport);
+  await walled.context().close();
+
+  if (!plan.relay) return;
+  const relayed = await open("relayed", `${plan.url}?${COARSE}`, (json) => {
+    json.moq = { url: plan.relay, name: json.moq.name };
+    return json;
+  });
+  await isLive(relayed);
+  facts.relayed = await relayed.evaluate(() => [dapple.live.transport, dapple.stats.points]);
 }
 
 async function open(name, url, change) {
