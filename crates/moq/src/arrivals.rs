@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use dapple_session::MAX_FROM_VIEWER_BYTES;
+use futures_channel::oneshot;
 use futures_util::future::{Either, select};
 use moq_net::{announce, broadcast, origin, track};
 
@@ -104,7 +105,8 @@ impl HostIn {
                 let talk = subscription().with_max_age(std::time::Duration::from_secs(10));
                 let talk = broadcast.track(TALK)?.subscribe(talk).await?;
                 let looks = broadcast.track(LOOKS)?.subscribe(subscription()).await?;
-                let (talk, looks) = (hear(talk, messages.clone()), look(looks, messages));
+                let (heard, is_heard) = oneshot::channel();
+                let (talk, looks) = (hear(talk, messages.clone(), heard), look(looks, messages, is_heard));
                 match select(Box::pin(talk), Box::pin(looks)).await {
                     Either::Left((ended, _)) | Either::Right((ended, _)) => ended,
                 }
@@ -121,16 +123,29 @@ impl HostIn {
     }
 }
 
-async fn hear(talk: track::Subscriber, mut messages: Messages) -> Result<(), LinkError> {
+async fn hear(
+    talk: track::Subscriber,
+    mut messages: Messages,
+    heard: oneshot::Sender<()>,
+) -> Result<(), LinkError> {
     let mut texts = Texts::new(talk, MAX_FROM_VIEWER_BYTES);
+    let mut heard = Some(heard);
     while let Some((text, _)) = texts.next().await? {
         messages.put(Message::Text(text)).await?;
+        if let Some(heard) = heard.take() {
+            let _ = heard.send(());
+        }
     }
     Ok(())
 }
 
-/// One look a group: those that were overtaken need not come.
-async fn look(mut looks: track::Subscriber, mut messages: Messages) -> Result<(), LinkError> {
+/// One look a group, once the hello was heard: those that were overtaken need not come.
+async fn look(
+    mut looks: track::Subscriber,
+    mut messages: Messages,
+    is_heard: oneshot::Receiver<()>,
+) -> Result<(), LinkError> {
+    let _ = is_heard.await;
     while let Some(mut group) = looks.recv_group().await? {
         match read(&mut group, MAX_FROM_VIEWER_BYTES).await {
             Ok(Some(bytes)) => messages.put(Message::Text(text(bytes)?)).await?,
