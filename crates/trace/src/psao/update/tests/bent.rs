@@ -144,4 +144,7 @@ fn refinement_leaves_bent_normals_as_they_are() {
     assert_eq!(updater.store().bent().unwrap(), &before);
     updater.step_all(&scene, &pose, &tracer);
     assert_eq!(updater.store().bent().unwrap(), &before);
+    let (tracer, mut plain) = start(&scene, &pose, UpdateParams { bent_normals: false, ..params });
+    plain.step_all(&scene, &pose, &tracer);
+    assert_eq!(updater.store().visibility(), plain.store().visibility());
 }
