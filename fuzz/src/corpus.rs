@@ -4,7 +4,7 @@
 mod scenes;
 
 use dapple_store::cells::CellChanges;
-use dapple_store::points::{Change, PointStore};
+use dapple_store::points::{BentChange, BentNormal, Change, PointStore};
 use dapple_stream::cells::{CellCodec, CellPublisher};
 use dapple_stream::{
     Frame, FrameHeader, FrameKind, Limits, Publisher, PublisherConfig, Recorder, RecordingHeader,
@@ -66,6 +66,12 @@ pub(crate) fn sample() -> PointStore {
     Input(&bytes).store()
 }
 
+/// The sample with bent normals.
+pub(crate) fn bent_sample() -> PointStore {
+    let plane = |step: u8| sample().visibility().iter().map(|v| (v >> 1) + step).collect();
+    sample().with_bent([plane(0), plane(64)]).expect("one a point")
+}
+
 /// Target, name and content of every seed.
 pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
     let mut seeds = Vec::new();
@@ -109,6 +115,18 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
     let mut empty = Publisher::new([0; 32], PublisherConfig::default());
     frame("empty", &publish(&mut empty, &Input(&[]).store()));
 
+    let mut bent = Publisher::new([0; 32], PublisherConfig::default());
+    frame("bent", &publish(&mut bent, &bent_sample()));
+    let mut turned = bent_sample();
+    let old = turned.bent_of(30).expect("it has some");
+    let turn = |point| BentChange { point, old, new: BentNormal([90, 160]) };
+    turned.apply_bent(&[turn(30), turn(31)]).expect("they exist");
+    turned.apply(&[Change { point: 31, visibility: 3 }]).expect("it exists");
+    frame("bent-delta", &publish(&mut bent, &turned));
+    let less = turned.with_sets(&[first], &PointStore::default()).expect("it is there");
+    frame("bent-sets-go", &publish(&mut bent, &less));
+    frame("bent-sets-come", &publish(&mut bent, &bent_sample()));
+
     cells(&mut seeds);
 
     // Soups of any numbers, of small ones and of very few different ones; mutations do the rest.
@@ -140,6 +158,14 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
         let mut random = Random(seed);
         let calls: Vec<u8> = (0..100 + 60 * seed).map(|_| random.bits() as u8).collect();
         seeds.push(("session_ops", format!("random-{seed}"), [&start[..], &calls].concat()));
+    }
+    // The same with bent normals, for each number of random calls again.
+    let bent_start = [&start[..21], &[33, 100, 200, 128, 90, 128, 160]].concat();
+    assert_eq!(start[21], 32);
+    for seed in 6..9 {
+        let mut random = Random(seed);
+        let calls: Vec<u8> = (0..60 * seed - 200).map(|_| random.bits() as u8).collect();
+        seeds.push(("session_ops", format!("bent-{seed}"), [&bent_start[..], &calls].concat()));
     }
     let mut calls = start.to_vec();
     calls.extend([5, 0, 0, 0, 0, 0, 2, 0, 0, 0, 7, 1, 0, 9, 6, 0, 0, 0, 0, 3, 0, 1, 2, 4, 7, 0, 0]);

@@ -19,6 +19,13 @@ static HOLDING: LazyLock<Subscriber> = LazyLock::new(|| {
     subscriber
 });
 
+/// The same with bent normals.
+static HOLDING_BENT: LazyLock<Subscriber> = LazyLock::new(|| {
+    let mut subscriber = Subscriber::new(None, LIMITS);
+    subscriber.receive(&fingerprint(&corpus::bent_sample())).expect("a sound frame");
+    subscriber
+});
+
 /// Receives `data` as it is, and its bytes after the first as the payload of a snapshot, delta or change of sets (first byte modulo 3)
 /// for epoch 1 of group 0. Nothing may panic; an error changes nothing; what was taken can be sent on.
 pub fn decode_frame(data: &[u8]) {
@@ -35,7 +42,7 @@ pub fn decode_frame(data: &[u8]) {
 }
 
 fn receive(frame: &[u8]) {
-    for start in [&Subscriber::new(None, LIMITS), &*HOLDING] {
+    for start in [&Subscriber::new(None, LIMITS), &*HOLDING, &*HOLDING_BENT] {
         let mut subscriber = start.clone();
         match subscriber.receive(frame) {
             Ok(Applied::Ignored(_)) | Err(_) => {

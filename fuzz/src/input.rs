@@ -48,7 +48,7 @@ impl Input<'_> {
         usize::from(u16::from_le_bytes([self.byte(), self.byte()])) % n.max(1)
     }
 
-    /// A store of up to 3 sets of up to 40 points.
+    /// A store of up to 3 sets of up to 40 points, with or without bent normals.
     pub(crate) fn store(&mut self) -> PointStore {
         let mut instance = 0;
         let sets: Vec<PointSet> = (0..self.below(4))
@@ -70,10 +70,14 @@ impl Input<'_> {
                 set
             })
             .collect();
-        let spacing = f32::from(self.byte()) + 0.5;
+        let spacing = self.byte();
+        let has_bent = spacing & 1 == 1;
+        let spacing = f32::from(spacing) + 0.5;
         let layout = Arc::new(PointLayout::new(1.0, spacing, sets).expect("points were sorted"));
-        let values = (0..layout.len()).map(|_| self.byte()).collect();
-        PointStore::new(layout, values).expect("one value a point")
+        let points = layout.len();
+        let mut plane = || (0..points).map(|_| self.byte()).collect();
+        let store = PointStore::new(layout, plane()).expect("one value a point");
+        if has_bent { store.with_bent([plane(), plane()]).expect("one a point") } else { store }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Any list of calls on a publisher and its subscribers: they converge.
 
-use dapple_store::points::{Change, PointLayout, PointStore};
+use dapple_store::points::{BentChange, BentNormal, Change, PointLayout, PointStore};
 use dapple_stream::{Applied, Frame, Limits, Precision, Publisher, PublisherConfig, Subscriber};
 
 use crate::input::{Input, fingerprint};
@@ -22,11 +22,9 @@ struct Session {
 /// right one, that damage is noticed, and that a join brings everyone up to date.
 pub fn session_ops(data: &[u8]) {
     let mut input = Input(data);
-    let config = PublisherConfig {
-        first_group: u64::from(input.byte()),
-        deltas_per_group: u32::from(input.byte()) % 8,
-        precision: Precision { tolerance: input.byte() % 16, step: input.byte() % 20 },
-    };
+    let (first_group, deltas_per_group) = (u64::from(input.byte()), u32::from(input.byte()) % 8);
+    let precision = Precision { tolerance: input.byte() % 16, step: input.byte() % 20 };
+    let config = PublisherConfig { first_group, deltas_per_group, precision, bent_precision: precision };
     let subscriber = Subscriber::new(Some([3; 32]), Limits::default());
     let mut session = Session {
         publisher: Publisher::new([3; 32], config),
@@ -62,6 +60,13 @@ impl Session {
                     .map(|_| Change { point: input.below(points) as u32, visibility: input.byte() })
                     .collect();
                 self.store.apply(&changes).expect("the points exist");
+                let bend = |change: &Change| {
+                    let old = self.store.bent_of(change.point as usize)?;
+                    let new = BentNormal([change.visibility, old.0[1] ^ change.visibility >> 5]);
+                    Some(BentChange { point: change.point, old, new })
+                };
+                let bent: Vec<BentChange> = changes.iter().filter_map(bend).collect();
+                self.store.apply_bent(&bent).expect("they have some");
                 self.publish();
             }
             2 => {
@@ -145,8 +150,16 @@ impl Session {
         let held = subscriber.store().expect("it has a snapshot");
         let published = self.publisher.store().expect("something is published");
         assert!(fingerprint(held) == fingerprint(published), "the stores differ");
-        let pairs = held.visibility().iter().zip(self.store.visibility());
-        assert!(pairs.clone().all(|(a, b)| a.abs_diff(*b) <= self.tolerance), "a value is too far off");
+        let planes = |store: &PointStore| -> Vec<u8> {
+            let bent = store.bent().into_iter().flatten().flatten();
+            store.visibility().iter().chain(bent).copied().collect()
+        };
+        let (held, wanted) = (planes(held), planes(&self.store));
+        let pairs = held.iter().zip(&wanted);
+        assert!(
+            held.len() == wanted.len() && pairs.clone().all(|(a, b)| a.abs_diff(*b) <= self.tolerance),
+            "a value is too far off"
+        );
         assert_eq!(
             (subscriber.group(), subscriber.epoch()),
             (self.publisher.group(), self.publisher.epoch())

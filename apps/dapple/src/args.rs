@@ -130,6 +130,10 @@ pub(crate) struct VisibilityArgs {
     /// How far the density of points follows the gradient of visibility, at the same number of points: 0 (uniform) to 1.
     #[arg(long, value_name = "X", default_value_t = 0.0)]
     pub(crate) adaptive: f32,
+    /// Two more bytes a point that say from where light comes to it, so that ambient light of several colours is gathered from there.
+    /// In pictures of `eval` and `render`; windows and pages do not use them yet.
+    #[arg(long)]
+    pub(crate) bent_normals: bool,
 }
 
 /// What a server spends: on each of its steps, and on what it sends.

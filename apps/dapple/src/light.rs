@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, bail};
 use dapple_scene::Scene;
-use dapple_server::{Progress, Server, ServerConfig};
+use dapple_server::{BENT_PRECISION, Progress, Server, ServerConfig};
 use dapple_stream::{Precision, PublisherConfig, Recorder, RecordingHeader};
 use dapple_trace::psao::generate::GenerateParams;
 use dapple_trace::psao::update::{StepInput, UpdateParams};
@@ -36,8 +36,13 @@ pub(crate) fn server_config(scene: &Scene, args: &LightArgs) -> Result<ServerCon
             radius_m,
             ..GenerateParams::default()
         },
-        update: UpdateParams { rays: visibility.point_rays, rays_still: step.rays_still, radius_m },
-        publish: PublisherConfig { precision: precision(visibility), ..PublisherConfig::default() },
+        update: UpdateParams {
+            rays: visibility.point_rays,
+            rays_still: step.rays_still,
+            radius_m,
+            bent_normals: visibility.bent_normals,
+        },
+        publish: publish(visibility.threshold),
         bits_per_s: args.bits_per_s(),
         max_resident_points: step.max_points,
         ..ServerConfig::default()
@@ -52,9 +57,10 @@ pub(crate) fn adaptive(args: &VisibilityArgs) -> Result<f32> {
     Ok(args.adaptive)
 }
 
-/// How exactly changes are sent.
-pub(crate) fn precision(args: &VisibilityArgs) -> Precision {
-    Precision { tolerance: args.threshold, ..Precision::default() }
+/// How exactly changes are sent: values of visibility may be off by the threshold.
+pub(crate) fn publish(threshold: u8) -> PublisherConfig {
+    let precision = Precision { tolerance: threshold, ..Precision::default() };
+    PublisherConfig { precision, bent_precision: BENT_PRECISION, ..PublisherConfig::default() }
 }
 
 /// Seconds after which the scene repeats: those of its animation, or ten of a still scene.

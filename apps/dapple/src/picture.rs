@@ -9,7 +9,8 @@ use dapple_render::compose::{ErrorKind, ResolvedPlane, resolve_plane, view_error
 use dapple_render::image::{Rgb8Image, ToneMap};
 use dapple_scene::Scene;
 use dapple_scene::glam::Vec3;
-use dapple_trace::rtao::Site;
+use dapple_trace::Tracer;
+use dapple_trace::rtao::{BentVisibility, RtaoParams, Site, SmoothSite, trace_bent};
 
 pub(crate) use crate::file::write_file;
 use crate::judge::Judge;
@@ -27,6 +28,31 @@ pub(crate) fn write_png(path: &Path, width: u32, height: u32, rgb8: &[[u8; 3]]) 
     )
     .with_context(|| format!("cannot encode {}", path.display()))?;
     write_file(path, &bytes)
+}
+
+/// Mean of the directions that are open over each sample (`sites` of the samples `indices`), in the world; zero where there is nothing.
+pub(crate) fn open_directions(
+    drawn: &Drawn,
+    tracer: &Tracer,
+    (indices, sites): (&[usize], &[Site]),
+    params: &RtaoParams,
+) -> Vec<Vec3> {
+    let smooth: Vec<SmoothSite> = sites
+        .iter()
+        .map(|site| SmoothSite {
+            site: *site,
+            shading_normal_world: site.normal_world,
+            first_ray: 0,
+            axes_world: None,
+        })
+        .collect();
+    let mut traced = vec![BentVisibility::default(); smooth.len()];
+    trace_bent(tracer, &smooth, params, &mut traced);
+    let mut open_world = vec![Vec3::ZERO; drawn.gbuffer.samples().len()];
+    for (&index, traced) in indices.iter().zip(traced) {
+        open_world[index] = traced.open_world;
+    }
+    open_world
 }
 
 /// A picture with one method's visibility, resolved to pixels.
@@ -50,8 +76,8 @@ pub(crate) struct Files {
 }
 
 impl Shown {
-    /// Composes `drawn` with one visibility a sample (all open for `None`).
-    pub(crate) fn new(drawn: &Drawn, visibility: Option<&[f32]>) -> Result<Shown> {
+    /// Composes `drawn` with one visibility a sample (all open for `None`), and with other ambient light than its own if there is some.
+    pub(crate) fn new(drawn: &Drawn, ambient: Option<&[Vec3]>, visibility: Option<&[f32]>) -> Result<Shown> {
         let gbuffer = &drawn.gbuffer;
         let open;
         let samples = match visibility {
@@ -61,7 +87,7 @@ impl Shown {
                 &open
             }
         };
-        let radiance = drawn.compose(visibility)?;
+        let radiance = drawn.compose_with(ambient, visibility)?;
         let beauty = radiance.to_rgb8(&ToneMap::default());
         let visibility = resolve_plane(gbuffer, samples, 1.0)?;
         let covered: Vec<bool> = visibility.coverage.values.iter().map(|&c| c > 0.0).collect();

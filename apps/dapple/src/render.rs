@@ -6,13 +6,14 @@ use dapple_render::compose::{
     ErrorKind, NormalSpace, PointsView, ResolvedPlane, draw_points, resolve_plane, view_error,
 };
 use dapple_render::compose::{view_normals, view_visibility};
-use dapple_render::image::{Rgb8Image, ToneMap};
+use dapple_render::image::{LinearImage, Rgb8Image, ToneMap};
 use dapple_render::psao::{Hat, Kernel};
+use dapple_render::shade::{Gathering, Openings, ShadeParams, shade_gathered};
 use dapple_render::ssao::{SsaoParams, estimate_visibility};
 use dapple_scene::PosedCamera;
 use dapple_scene::glam::Vec3;
 use dapple_server::{Progress, Server, ServerConfig};
-use dapple_stream::{Limits, PublisherConfig};
+use dapple_stream::Limits;
 use dapple_trace::Tracer;
 use dapple_trace::psao::generate::GenerateParams;
 use dapple_trace::psao::update::UpdateParams;
@@ -20,8 +21,8 @@ use dapple_trace::rtao::{RtaoParams, trace_visibility_with_progress};
 
 use crate::args::{RenderArgs, RenderMethod, View};
 use crate::exr_file::{write_gray, write_rgb};
-use crate::light::{adaptive, precision};
-use crate::picture::{sites, write_png};
+use crate::light::{adaptive, publish};
+use crate::picture::{open_directions, sites, write_png};
 use crate::progress::Bar;
 use crate::source::{self, Loaded};
 
@@ -65,10 +66,7 @@ fn picture(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn, camera: &PosedCame
     Ok(match args.view {
         View::Normal => view_normals(&drawn.gbuffer, &loaded.scene, &drawn.pose, NormalSpace::World),
         View::Points => points_view(args, loaded, drawn, camera)?,
-        View::Beauty => {
-            let visibility = visibility(args, args.method, loaded, drawn, camera)?;
-            drawn.compose(visibility.as_deref())?.to_rgb8(&ToneMap::default())
-        }
+        View::Beauty => radiance(args, loaded, drawn, camera)?.to_rgb8(&ToneMap::default()),
         View::Visibility => {
             let visibility = visibility(args, args.method, loaded, drawn, camera)?;
             view_visibility(&drawn.gbuffer, &visibility.unwrap_or_else(|| open(drawn)))?
@@ -92,10 +90,7 @@ fn numbers(
         return Ok(None);
     }
     Ok(Some(match args.view {
-        View::Beauty => {
-            let visibility = visibility(args, args.method, loaded, drawn, camera)?;
-            Numbers::Rgb(drawn.compose(visibility.as_deref())?.pixels)
-        }
+        View::Beauty => Numbers::Rgb(radiance(args, loaded, drawn, camera)?.pixels),
         View::Visibility => {
             let visibility =
                 visibility(args, args.method, loaded, drawn, camera)?.unwrap_or_else(|| open(drawn));
@@ -144,6 +139,12 @@ fn check(args: &RenderArgs) -> Result<()> {
     if args.view == View::Points && is_exr(args) {
         bail!("--view points is a picture of discs: write it to a .png");
     }
+    let takes_bent = matches!(args.method, RenderMethod::Psao | RenderMethod::Rtao);
+    if args.visibility.bent_normals && !takes_bent {
+        bail!(
+            "--bent-normals changes pictures of --method psao and rtao alone: choose one of them, or leave it out"
+        );
+    }
     if !args.time.is_finite() {
         bail!("--time must be a finite number of seconds");
     }
@@ -155,6 +156,31 @@ fn check(args: &RenderArgs) -> Result<()> {
 
 fn open(drawn: &Drawn) -> Vec<f32> {
     vec![1.0; drawn.gbuffer.samples().len()]
+}
+
+/// The picture before tone mapping. With bent normals ambient light is gathered from where it comes: from about those of the points, or, by
+/// rays, from the directions that they find open.
+fn radiance(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn, camera: &PosedCamera) -> Result<LinearImage> {
+    let (scene, shade) = (&loaded.scene, ShadeParams::default());
+    let bent = args.visibility.bent_normals;
+    match args.method {
+        RenderMethod::Psao if bent => {
+            let (_, client) = light(args, loaded)?;
+            let visibility = client.visibility(drawn, &Reconstruction::Atlas);
+            let ambient = client.ambient(drawn, camera, &shade, &visibility);
+            Ok(drawn.compose_with(ambient.as_deref(), Some(&visibility))?)
+        }
+        RenderMethod::Rtao if bent => {
+            let visibility = traced(args, loaded, drawn)?;
+            let (indices, sites) = sites(scene, drawn);
+            let tracer = Tracer::new(scene, &drawn.pose);
+            let open_world = open_directions(drawn, &tracer, (&indices, &sites), &rtao(args, loaded)?);
+            let gathering = Gathering { visibility: &visibility, openings: Openings::Traced(&open_world) };
+            let ambient = shade_gathered(scene, &drawn.pose, camera, &drawn.gbuffer, &shade, gathering);
+            Ok(drawn.compose_with(Some(&ambient), Some(&visibility))?)
+        }
+        method => Ok(drawn.compose(visibility(args, method, loaded, drawn, camera)?.as_deref())?),
+    }
 }
 
 /// One visibility a sample; `None` for no occlusion.
@@ -176,12 +202,17 @@ fn visibility(
     Ok(Some(client.visibility(drawn, &reconstruction)))
 }
 
-fn traced(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn) -> Result<Vec<f32>> {
+/// The rays of a sample.
+fn rtao(args: &RenderArgs, loaded: &Loaded) -> Result<RtaoParams> {
     let (radius_m, _) = source::resolve_radius(&loaded.scene, &args.visibility)?;
+    let rays = args.rays.div_ceil(args.supersample * args.supersample);
+    Ok(RtaoParams { rays, radius_m, seed: u64::from(args.visibility.seed) })
+}
+
+fn traced(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn) -> Result<Vec<f32>> {
     let tracer = Tracer::new(&loaded.scene, &drawn.pose);
     let (indices, sites) = sites(&loaded.scene, drawn);
-    let rays = args.rays.div_ceil(args.supersample * args.supersample);
-    let params = RtaoParams { rays, radius_m, seed: u64::from(args.visibility.seed) };
+    let params = rtao(args, loaded)?;
     let mut traced = vec![1.0; sites.len()];
     let bar = Bar::new("rays", sites.len() as u64);
     trace_visibility_with_progress(&tracer, &sites, &params, &mut traced, &|done| bar.set(done));
@@ -211,8 +242,13 @@ fn light(args: &RenderArgs, loaded: &Loaded) -> Result<(Server, Client)> {
             radius_m,
             ..GenerateParams::default()
         },
-        update: UpdateParams { rays: args.visibility.point_rays, radius_m, ..UpdateParams::default() },
-        publish: PublisherConfig { precision: precision(&args.visibility), ..PublisherConfig::default() },
+        update: UpdateParams {
+            rays: args.visibility.point_rays,
+            radius_m,
+            bent_normals: args.visibility.bent_normals,
+            ..UpdateParams::default()
+        },
+        publish: publish(args.visibility.threshold),
         ..ServerConfig::default()
     };
     let bar = Bar::new("points", 1000);

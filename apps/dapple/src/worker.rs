@@ -264,7 +264,12 @@ fn config(setup: &Setup, shard: Shard) -> ServerConfig {
             radius_m: setup.radius_m,
             ..GenerateParams::default()
         },
-        update: UpdateParams { rays: setup.rays, rays_still: setup.rays_still, radius_m: setup.radius_m },
+        update: UpdateParams {
+            rays: setup.rays,
+            rays_still: setup.rays_still,
+            radius_m: setup.radius_m,
+            ..UpdateParams::default()
+        },
         // Groups of an earlier worker of this part must not be taken for this one's.
         publish: PublisherConfig {
             first_group: since_1970.map_or(0, |since| since.as_millis() as u64),

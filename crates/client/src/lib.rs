@@ -18,12 +18,15 @@ pub mod viewer;
 use std::sync::{Arc, OnceLock};
 
 use dapple_render::RenderError;
-use dapple_render::compose::compose;
+use dapple_render::compose::{compose, compose_with};
 use dapple_render::gbuffer::{GBuffer, rasterize};
 use dapple_render::image::LinearImage;
 use dapple_render::psao::atlas::{AtlasParams, PointChange, VisibilityAtlas};
 use dapple_render::psao::{Kernel, PointIndex, reconstruct};
-use dapple_render::shade::{ShadeParams, Shaded, render_shadow_maps, shade};
+use dapple_render::shade::{
+    Gathering, Openings, ShadeParams, Shaded, render_shadow_maps, shade, shade_gathered,
+};
+use dapple_scene::glam::Vec3;
 use dapple_scene::{Edits, Pose, PosedCamera, Scene};
 use dapple_store::charts::Cuts;
 use dapple_store::points::PointStore;
@@ -85,6 +88,15 @@ impl Drawn {
     pub fn compose(&self, visibility: Option<&[f32]>) -> Result<LinearImage, RenderError> {
         compose(&self.shaded, &self.gbuffer, visibility)
     }
+
+    /// The picture with other ambient radiance than is in `shaded`, one a sample ([`Client::ambient`]); with that where it is `None`.
+    pub fn compose_with(
+        &self,
+        ambient: Option<&[Vec3]>,
+        visibility: Option<&[f32]>,
+    ) -> Result<LinearImage, RenderError> {
+        compose_with(ambient.unwrap_or(&self.shaded.ambient), &self.shaded, &self.gbuffer, visibility)
+    }
 }
 
 impl Client {
@@ -105,6 +117,7 @@ impl Client {
             (Applied::Changes(changes), Some(atlas)) => {
                 atlas.begin_update(1.0);
                 atlas.apply(changes.iter().map(|c| PointChange { point: c.point, old: c.old, new: c.new }));
+                atlas.apply_bent(self.subscriber.bent_changes());
             }
             (Applied::Sets { removed, changes, .. }, atlas) => {
                 self.index = OnceLock::new();
@@ -117,7 +130,8 @@ impl Client {
                         old: c.old,
                         new: c.new,
                     }));
-                    while !atlas.work(&self.scene, store.visibility(), usize::MAX).is_complete() {}
+                    atlas.apply_bent(self.subscriber.bent_changes());
+                    complete(atlas, &self.scene, store);
                 }
             }
             _ => {}
@@ -171,6 +185,23 @@ impl Client {
         }
     }
 
+    /// What each sample reflects from the surroundings, gathered from about the bent normals of the points around it instead of the sample's
+    /// own normal; `None` where no bent normals are held. Through the atlas, whatever `visibility` (one a sample) is reconstructed by. `camera`
+    /// and `shade` are those that it was drawn with.
+    pub fn ambient(
+        &self,
+        drawn: &Drawn,
+        camera: &PosedCamera,
+        shade: &ShadeParams,
+        visibility: &[f32],
+    ) -> Option<Vec<Vec3>> {
+        let store = self.subscriber.store().filter(|store| store.bent().is_some())?;
+        let (scene, Drawn { pose, gbuffer, .. }) = (&self.scene, drawn);
+        let bent = self.atlas_of(store).reconstruct_bent(scene, pose, gbuffer);
+        let gathering = Gathering { visibility, openings: Openings::Bent(&bent) };
+        Some(shade_gathered(scene, pose, camera, gbuffer, shade, gathering))
+    }
+
     /// The atlas, complete; nothing before the first snapshot.
     pub fn atlas(&self) -> Option<&VisibilityAtlas> {
         self.subscriber.store().map(|store| self.atlas_of(store))
@@ -181,9 +212,17 @@ impl Client {
             let layout = store.layout().clone();
             let mut atlas =
                 VisibilityAtlas::new(layout, &self.scene, self.subscriber.cuts(), AtlasParams::default());
-            while !atlas.work(&self.scene, store.visibility(), usize::MAX).is_complete() {}
+            complete(&mut atlas, &self.scene, store);
             atlas
         })
+    }
+}
+
+/// Makes all of an atlas that is not made yet.
+fn complete(atlas: &mut VisibilityAtlas, scene: &Scene, store: &PointStore) {
+    while !atlas.work(scene, store.visibility(), usize::MAX).is_complete() {}
+    if let Some(bent) = store.bent() {
+        atlas.resolve_bent(bent);
     }
 }
 

@@ -81,7 +81,11 @@ impl Default for ServerConfig {
         ServerConfig {
             generate: GenerateParams::default(),
             update: UpdateParams::default(),
-            publish: PublisherConfig { precision: Precision { tolerance: 4, step: 0 }, ..Default::default() },
+            publish: PublisherConfig {
+                precision: Precision { tolerance: 4, step: 0 },
+                bent_precision: BENT_PRECISION,
+                ..Default::default()
+            },
             bits_per_s: None,
             cuts: true,
             max_resident_points: None,
@@ -89,6 +93,9 @@ impl Default for ServerConfig {
         }
     }
 }
+
+/// How exactly bent normals are sent if nobody says otherwise: within 8 of 127 along each tangent, about what 64 rays know of them.
+pub const BENT_PRECISION: Precision = Precision { tolerance: 8, step: 0 };
 
 /// What a long start is doing, for progress bars.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

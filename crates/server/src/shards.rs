@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use dapple_scene::Scene;
 use dapple_store::charts::Cuts;
-use dapple_store::points::{Change, LayoutError, PointStore};
+use dapple_store::points::{BentChange, Change, LayoutError, PointLayout, PointStore};
 use dapple_stream::{
     Applied, Budget, Frame, FrameKind, Limits, Publisher, PublisherConfig, ReceiveError, Spending, Subscriber,
 };
@@ -114,23 +114,19 @@ impl Merger {
         match applied {
             Applied::Ignored(_) => Ok(()),
             Applied::Changes(changes) => {
-                let store = part.subscriber.store().expect("changes are of a store");
-                if changes.is_empty() {
-                    return Ok(());
-                }
-                let mut news = Vec::with_capacity(changes.len());
-                let mut sets = store.layout().sets().iter();
-                let mut set = sets.next().expect("a changed point is one of a set");
-                let mut first = self.first_of(set.instance);
-                for change in changes {
-                    while change.point >= set.first + set.len() as u32 {
-                        set = sets.next().expect("a changed point is one of a set");
-                        first = self.first_of(set.instance);
-                    }
-                    let Some(first) = first else { continue };
-                    news.push(Change { point: first + change.point - set.first, visibility: change.new });
-                }
+                let layout = part.subscriber.store().expect("changes are of a store").layout();
+                let mut place = self.places_of(layout);
+                let news = changes.iter().filter_map(|change| {
+                    Some(Change { point: place(change.point)?, visibility: change.new })
+                });
+                let news: Vec<Change> = news.collect();
+                let mut place = self.places_of(layout);
+                let bent = part.subscriber.bent_changes().iter();
+                let bent: Vec<BentChange> = bent
+                    .filter_map(|change| Some(BentChange { point: place(change.point)?, ..*change }))
+                    .collect();
                 self.store.apply(&news).expect("they are points of the whole");
+                self.store.apply_bent(&bent).expect("the whole has what its parts have");
                 Ok(())
             }
             Applied::NewLayout | Applied::Sets { .. } => {
@@ -144,8 +140,22 @@ impl Merger {
         }
     }
 
-    fn first_of(&self, instance: u32) -> Option<u32> {
-        self.store.layout().set_of_instance(instance).map(|set| set.first)
+    /// Where in the whole the points of a part are, to be asked in their order.
+    fn places_of(&self, part: &PointLayout) -> impl FnMut(u32) -> Option<u32> + use<> {
+        let whole = self.store.layout();
+        let first_of = |instance| whole.set_of_instance(instance).map(|set| set.first);
+        let sets: Vec<_> = part
+            .sets()
+            .iter()
+            .map(|set| (set.first..set.first + set.len() as u32, first_of(set.instance)))
+            .collect();
+        let mut at = 0;
+        move |point| {
+            while point >= sets[at].0.end {
+                at += 1;
+            }
+            sets[at].1.map(|first| first + point - sets[at].0.start)
+        }
     }
 
     /// Puts a part's sets in the place of those that it had.

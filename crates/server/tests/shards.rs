@@ -8,6 +8,7 @@ use dapple_server::shards::{MergeError, Merger, Shard};
 use dapple_server::{Server, ServerConfig, ServerError};
 use dapple_stream::{Limits, Precision, PublisherConfig, Subscriber};
 use dapple_trace::psao::generate::GenerateParams;
+use dapple_trace::psao::update::UpdateParams;
 
 fn scene() -> Arc<Scene> {
     let glb = builtin::glb("cornell", 0.2).unwrap();
@@ -18,6 +19,7 @@ fn config(shard: Option<Shard>) -> ServerConfig {
     let precision = Precision { tolerance: 0, step: 0 };
     ServerConfig {
         generate: GenerateParams { points_per_m2: 60.0, ..GenerateParams::default() },
+        update: UpdateParams { bent_normals: true, ..UpdateParams::default() },
         publish: PublisherConfig { precision, ..PublisherConfig::default() },
         shard,
         ..ServerConfig::default()
@@ -81,9 +83,11 @@ fn parts_put_together_are_the_whole_to_the_bit() {
         }
         let held = viewer.store().unwrap();
         assert!(held.visibility() == merger.store().visibility(), "step {step}");
+        assert!(held.bent().is_some() && held.bent() == merger.store().bent(), "step {step}: bent normals");
         if step >= 8 || (3..5).contains(&step) {
             assert!(held.layout() == whole.store().layout(), "step {step}: points");
             assert!(held.visibility() == whole.traced().visibility(), "step {step}: values");
+            assert!(held.bent() == whole.traced().bent(), "step {step}: bent normals");
         }
     }
     // Who joins late gets the same.

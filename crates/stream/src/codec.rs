@@ -5,7 +5,8 @@
 //! nearly from the other two, because points lie on surfaces whose normals are known ([`plane`]). With the layout come
 //! the cuts: which points do not count at which texels. Values, and what changed of them, are foretold from neighbours and
 //! written by an entropy coder (`values/`, `entropy/`); a delta builds on the values the receiver holds and on nothing else. Sets
-//! of points that come are a small snapshot of their own ([`sets`]).
+//! of points that come are a small snapshot of their own ([`sets`]). Bent normals, where a store has them, are two more planes of
+//! values like those of visibility ([`planes`]).
 
 mod columns;
 mod decode;
@@ -14,6 +15,7 @@ mod encode;
 mod entropy;
 mod frame;
 mod plane;
+mod planes;
 mod sets;
 mod values;
 pub(crate) mod varint;
@@ -22,11 +24,12 @@ pub(crate) use decode::{
     DecodedLayout, DeltaParts, decode_changes, decode_layout, decode_values, parse_delta, parse_snapshot,
 };
 #[cfg(feature = "publish")]
-pub(crate) use encode::{
-    EncodedLayout, append_changes, delta_payload, encode_layout, local_bits, snapshot_payload,
-};
+pub(crate) use encode::{EncodedLayout, append_changes, encode_layout, local_bits, snapshot_payload};
 pub(crate) use frame::open;
 pub use frame::{FrameHeader, FrameKind, MAGIC, VERSION, seal};
+pub(crate) use planes::Changes;
+#[cfg(feature = "publish")]
+pub(crate) use planes::{PLANES, planes};
 #[cfg(feature = "publish")]
 pub(crate) use sets::sets_head;
 pub(crate) use sets::{DecodedSets, decode_sets_change};

@@ -54,6 +54,37 @@ static SETS: LazyLock<Vec<u8>> = LazyLock::new(|| {
     publisher.publish(&next).unwrap().bytes.to_vec()
 });
 
+/// The sample with bent normals: its snapshot (epoch 0), the delta to a later state (1), and a change of sets (2).
+static BENT: LazyLock<[Vec<u8>; 3]> = LazyLock::new(|| {
+    let bent = |store: PointStore| {
+        let plane = |turn: u8| store.visibility().iter().map(|v| v.rotate_left(turn.into())).collect();
+        let planes = [plane(1), plane(3)];
+        store.with_bent(planes).unwrap()
+    };
+    let store = cloud::hall(3, 3000);
+    let mut publisher = Publisher::new([1; 32], PublisherConfig::default());
+    let mut frame = |store: &PointStore| publisher.publish(store).unwrap().bytes.to_vec();
+    let moved = bent(cloud::moved(&store, 4, 0.1));
+    let mut set = store.layout().sets()[1].clone();
+    set.instance = 900;
+    let added = PointLayout::new(store.layout().quantum_m(), store.layout().spacing_m(), vec![set]).unwrap();
+    let values = (0..added.len()).map(|i| i as u8).collect();
+    let added = bent(PointStore::new(added.into(), values).unwrap());
+    [frame(&bent(store)), frame(&moved), frame(&moved.with_sets(&[], &added).unwrap())]
+});
+
+/// Holds the sample with bent normals after so many of its frames.
+fn bent(frames: usize) -> Subscriber {
+    static HOLDING: LazyLock<[Subscriber; 3]> = LazyLock::new(|| {
+        [0, 1, 2].map(|frames| {
+            let mut subscriber = Subscriber::new(None, Limits::default());
+            BENT[..frames].iter().for_each(|frame| drop(subscriber.receive(frame).unwrap()));
+            subscriber
+        })
+    });
+    HOLDING[frames].clone()
+}
+
 /// Enough cuts in two sets that their sections are compressed.
 fn cuts() -> Cuts {
     let set = |instance, count: u32| {
@@ -134,6 +165,27 @@ proptest! {
         let frame = seal(kind, 0, 12, &bytes);
         let mut subscriber = if delta { holding() } else { Subscriber::new(None, Limits::default()) };
         let _ = receive(&mut subscriber, &frame);
+    }
+
+    #[test]
+    fn damaged_bent_normals_do_no_harm(
+        which in 0usize..3,
+        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
+        cut in prop::option::weighted(0.2, any::<prop::sample::Index>()),
+    ) {
+        let mut bytes = payload(&BENT[which]);
+        for (at, value) in &edits {
+            let range = if value % 2 == 0 { bytes.len() } else { bytes.len().min(80) };
+            let at = at.index(range);
+            bytes[at] = *value;
+        }
+        if let Some(cut) = cut {
+            bytes.truncate(cut.index(bytes.len()));
+        }
+        let kind = [FrameKind::Snapshot, FrameKind::Delta, FrameKind::Sets][which];
+        let _ = receive(&mut bent(which), &seal(kind, 0, which as u64, &bytes));
+        // To who has none they are something else.
+        let _ = receive(&mut holding(), &seal(kind, 0, 11, &bytes));
     }
 
     #[test]
@@ -329,4 +381,43 @@ fn rules_of_changes_of_sets_are_enforced() {
         let less = Limits { max_points: points as u32 - 1, ..exact };
         assert!(matches!(at_most(less), Err(ReceiveError::Decode(DecodeError::TooLarge { .. }))));
     }
+}
+
+#[test]
+fn what_breaks_the_rules_of_bent_normals_is_named() {
+    let malformed = |subscriber: &mut Subscriber, kind, epoch, bytes: &[u8], named: &str| {
+        let error = receive(subscriber, &seal(kind, 0, epoch, bytes)).unwrap_err().to_string();
+        assert!(error.contains(named), "{error}");
+    };
+    // After the base epoch a delta says which planes change.
+    let delta = payload(&BENT[1]);
+    assert_eq!(delta[..2], [1, 7]);
+    for (planes, named) in [(0, "planes"), (8, "planes"), (0x47, "planes")] {
+        let mut bytes = delta.clone();
+        bytes[1] = planes;
+        malformed(&mut bent(1), FrameKind::Delta, 1, &bytes, named);
+    }
+    for (at, value, named) in [(4, 0, "step: is 0"), (7, 129, "share: exceeds 2")] {
+        let mut bytes = delta.clone();
+        bytes[at] = value;
+        malformed(&mut bent(1), FrameKind::Delta, 1, &bytes, named);
+    }
+    malformed(&mut bent(1), FrameKind::Delta, 1, &delta[..1], "");
+    // A plane that is said to change and does not.
+    malformed(&mut bent(1), FrameKind::Delta, 1, &[1, 2, 1, 58], "changes");
+    // Sets without bent normals beside sets with some, and the other way round.
+    let mut plain = further();
+    let with = payload(&BENT[2]);
+    malformed(&mut plain, FrameKind::Sets, 13, &with, "bent normals");
+    let mut without = with;
+    // 1 epoch back, none goes, a varint of two bytes, quantum and spacing.
+    assert!(without[2] >= 0x80 && without[3] < 0x80 && without[12] >= 0x80, "{:x?}", &without[..16]);
+    without[12] &= 0x7f;
+    malformed(&mut bent(2), FrameKind::Sets, 2, &without, "bent normals");
+    // Bits that mean nothing.
+    let mut snapshot = payload(&BENT[0]);
+    let flags = 32 + 2 + 8;
+    assert!(snapshot[flags] >= 0x80 && snapshot[flags] & 0x7f <= 8, "{:x?}", &snapshot[32..50]);
+    snapshot[flags] |= 0x40;
+    malformed(&mut Subscriber::new(None, Limits::default()), FrameKind::Snapshot, 0, &snapshot, "local bits");
 }

@@ -47,15 +47,19 @@ fn claim(points: u64, coded: &[u8]) -> Vec<u8> {
     out
 }
 
-/// The payload of a snapshot of points in one place that all have the same value, with a cut at each of some sites.
-fn heap(points: usize, cuts: u32) -> Vec<u8> {
+/// The payload of a snapshot of points in one place that all have the same value, with a cut at each of some sites, with or without
+/// bent normals.
+fn heap(points: usize, cuts: u32, has_bent: bool) -> Vec<u8> {
     let set = PointSet {
         positions: vec![[0; 3]; points],
         normals: vec![PackedNormal([0, 0]); points],
         ..PointSet::default()
     };
     let layout = Arc::new(PointLayout::new(1.0, 1.0, vec![set]).expect("it keeps the rules"));
-    let store = PointStore::new(layout.clone(), vec![9; points]).expect("one value a point");
+    let mut store = PointStore::new(layout.clone(), vec![9; points]).expect("one value a point");
+    if has_bent {
+        store = store.with_bent([vec![128; points], vec![4; points]]).expect("one a point");
+    }
     let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
     let list = (0..cuts).map(|site| SiteCut { site, mask: 1 }).collect();
     let cuts = SetCuts { instance: 0, sites: cuts, fingerprint: 9, cuts: list };
@@ -96,15 +100,18 @@ fn memory_is_bounded_whatever_the_bytes_claim() {
     // A bomb that keeps every rule, a million points in one place: taken, within the documented bound.
     let points = 1usize << 20;
     let small = Limits { max_points: points as u32, ..Limits::default() };
-    let payload = heap(points, 0);
+    let bound = 64 * points + 256 * small.max_sets as usize + 8 * MIB;
+    let payload = heap(points, 0, true);
+    let (peak, result) = peak_bytes(small, &payload);
+    assert!(result.is_ok() && peak <= bound, "{peak} bytes, bound {bound}: {result:?}");
+    let payload = heap(points, 0, false);
     assert!(payload.len() < 6000, "{} bytes", payload.len());
     let (peak, result) = peak_bytes(small, &payload);
-    let bound = 64 * points + 256 * small.max_sets as usize + 8 * MIB;
     assert!(result.is_ok() && peak <= bound, "{peak} bytes, bound {bound}: {result:?}");
     println!("a million points: {peak} bytes from {}", payload.len());
     // The same with as many cuts as are taken, then one more.
     for (cuts, sound) in [(small.max_cuts, true), (small.max_cuts + 1, false)] {
-        let payload = heap(points, cuts);
+        let payload = heap(points, cuts, false);
         assert!(payload.len() < 20_000, "{} bytes", payload.len());
         let (peak, result) = peak_bytes(small, &payload);
         let bound = bound + 32 * small.max_cuts as usize;

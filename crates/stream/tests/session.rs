@@ -8,7 +8,7 @@ mod random;
 
 use common::same_bits;
 use dapple_store::charts::{Cuts, SetCuts, SiteCut};
-use dapple_store::points::{Change, PointLayout, PointStore};
+use dapple_store::points::{BentChange, BentNormal, Change, PointLayout, PointStore};
 use dapple_stream::{
     Applied, Frame, FrameKind, IgnoreReason, Limits, Precision, Publisher, PublisherConfig, ReceiveError,
     Subscriber,
@@ -69,6 +69,13 @@ fn change(store: &mut PointStore, changes: &[(prop::sample::Index, u8)]) {
     };
     let changes: Vec<Change> = changes.iter().map(change).take(points).collect();
     store.apply(&changes).unwrap();
+    let bend = |change: &Change| {
+        let old = store.bent_of(change.point as usize)?;
+        let new = BentNormal([old.0[0].wrapping_add(change.visibility % 3), change.visibility]);
+        Some(BentChange { point: change.point, old, new })
+    };
+    let bent: Vec<BentChange> = changes.iter().filter_map(bend).collect();
+    store.apply_bent(&bent).unwrap();
 }
 
 /// Lets sets go that are there, and others come: of each instance always the same points, with values by their number.
@@ -124,7 +131,11 @@ fn run(start: &PointStore, steps: &[Step], config: PublisherConfig) -> Run {
         let held = publisher.store().expect("something is published");
         let tolerance = config.precision.tolerance;
         assert!(held.visibility().iter().zip(store.visibility()).all(|(a, b)| a.abs_diff(*b) <= tolerance));
-        assert!(tolerance > 0 || same_bits(held, &store));
+        let planes = held.bent().into_iter().flatten().zip(store.bent().into_iter().flatten());
+        let within = |a: &[u8], b: &[u8], most| a.iter().zip(b).all(|(a, b)| a.abs_diff(*b) <= most);
+        let bent_tolerance = config.bent_precision.tolerance;
+        assert!(planes.into_iter().all(|(a, b)| within(a, b, bent_tolerance)));
+        assert!(tolerance > 0 || bent_tolerance > 0 || same_bits(held, &store));
         run.states.push(held.clone());
         run.sets += frames.iter().filter(|frame| frame.kind == FrameKind::Sets).count();
         run.frames.push(frames);
@@ -136,11 +147,13 @@ fn run(start: &PointStore, steps: &[Step], config: PublisherConfig) -> Run {
 fn config() -> impl Strategy<Value = PublisherConfig> {
     let precision = prop_oneof![Just((0u8, 0u8)), Just((4, 0)), (0u8..=127, any::<u8>())];
     let precision = precision.prop_map(|(tolerance, step)| Precision { tolerance, step });
-    (prop_oneof![Just(0u64), 1u64 << 40..1 << 41], 0u32..5, precision).prop_map(
-        |(first_group, deltas_per_group, precision)| PublisherConfig {
+    let precisions = (precision.clone(), precision);
+    (prop_oneof![Just(0u64), 1u64 << 40..1 << 41], 0u32..5, precisions).prop_map(
+        |(first_group, deltas_per_group, (precision, bent_precision))| PublisherConfig {
             first_group,
             deltas_per_group,
             precision,
+            bent_precision,
         },
     )
 }
@@ -181,6 +194,11 @@ proptest! {
                     let news: Vec<Change> =
                         changes.iter().map(|c| Change { point: c.point, visibility: c.new }).collect();
                     redone.apply(&news).unwrap();
+                    for change in late.bent_changes() {
+                        prop_assert_eq!(redone.bent_of(change.point as usize), Some(change.old));
+                        prop_assert_ne!(change.old, change.new);
+                    }
+                    redone.apply_bent(late.bent_changes()).unwrap();
                     prop_assert!(same_bits(&redone, late.store().unwrap()));
                 }
             }
@@ -402,4 +420,58 @@ fn sets_that_come_and_go_are_a_small_frame_and_what_stays_is_kept() {
     assert!(std::sync::Arc::ptr_eq(&layout, live.store().unwrap().layout()));
     // Nothing in common: a snapshot, as ever.
     assert_eq!(publisher.publish(&store(vec![big(9)], 1)).unwrap().kind, FrameKind::Snapshot);
+}
+
+/// What a store has without its bent normals.
+fn unbent(store: &PointStore) -> PointStore {
+    PointStore::new(store.layout().clone(), store.visibility().to_vec()).unwrap()
+}
+
+#[test]
+fn bent_normals_come_and_go_with_a_new_group_and_change_no_visibility() {
+    let plain = small();
+    let bent = plain.clone().with_bent([(0..100).collect(), vec![128; 100]]).unwrap();
+    let mut publisher = Publisher::new(SCENE, PublisherConfig::default());
+    let mut receiver = subscriber();
+    for (group, store) in [&plain, &bent, &plain].into_iter().enumerate() {
+        let frame = publisher.publish(store).unwrap();
+        assert_eq!((frame.kind, frame.group), (FrameKind::Snapshot, group as u64));
+        assert_eq!(receiver.receive(&frame.bytes), Ok(Applied::NewLayout));
+        assert!(same_bits(receiver.store().unwrap(), store));
+        assert!(publisher.publish(store).is_none(), "a still scene sends nothing");
+    }
+}
+
+#[test]
+fn a_delta_of_bent_normals_alone_changes_them_alone() {
+    let mut store = small().with_bent([vec![128; 100], vec![128; 100]]).unwrap();
+    let mut publisher = Publisher::new(SCENE, PublisherConfig::default());
+    let mut receiver = subscriber();
+    receiver.receive(&publisher.publish(&store).unwrap().bytes).unwrap();
+    let change = BentChange { point: 7, old: BentNormal::UNBENT, new: BentNormal([128, 90]) };
+    store.apply_bent(&[change]).unwrap();
+    let frame = publisher.publish(&store).unwrap();
+    assert!(frame.bytes.len() <= 26, "{} bytes", frame.bytes.len());
+    assert_eq!(publisher.changed(), 0);
+    assert_eq!(receiver.receive(&frame.bytes), Ok(Applied::Changes(Vec::new())));
+    assert_eq!(receiver.bent_changes(), [change]);
+    assert_eq!(unbent(receiver.store().unwrap()), small());
+    // Heard once is enough.
+    assert!(matches!(receiver.receive(&frame.bytes), Ok(Applied::Ignored(_))));
+    assert_eq!(receiver.bent_changes(), []);
+}
+
+#[test]
+fn bent_normals_have_a_tolerance_of_their_own() {
+    let mut store = small().with_bent([vec![128; 100], vec![128; 100]]).unwrap();
+    let bent_precision = Precision { tolerance: 6, step: 0 };
+    let mut publisher = Publisher::new(SCENE, PublisherConfig { bent_precision, ..Default::default() });
+    publisher.publish(&store).unwrap();
+    let mut bend = |byte: u8| {
+        let old = store.bent_of(3).unwrap();
+        store.apply_bent(&[BentChange { point: 3, old, new: BentNormal([byte, 128]) }]).unwrap();
+        publisher.publish(&store)
+    };
+    assert!(bend(134).is_none());
+    assert!(bend(135).is_some());
 }

@@ -5,7 +5,7 @@
 mod common;
 
 use dapple_store::charts::{Cuts, SetCuts, SiteCut};
-use dapple_store::points::{Change, PointLayout, PointStore};
+use dapple_store::points::{BentChange, BentNormal, Change, PointLayout, PointStore};
 use dapple_stream::{Applied, FrameHeader, Limits, Publisher, PublisherConfig, Subscriber, ValueChange};
 
 const DOCUMENT: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/wire.md"));
@@ -124,6 +124,33 @@ fn encoding_gives_the_vectors() {
     publisher.set_cuts(other.layout().clone(), cuts);
     let sets = publisher.publish(&other).unwrap();
     assert_eq!(hex(&vector("sets")), hex(&sets.bytes));
+}
+
+/// Four points in a row with bent normals, of which one turns while another darkens.
+#[test]
+fn the_bent_vectors_are_those_of_the_encoder_and_decode() {
+    let points = (0..4).map(|i| ([i, 0, 0], [127, 127])).collect();
+    let layout = PointLayout::new(1.0, 1.0, vec![common::set(0, [0.0; 3], points)]).unwrap();
+    let store = PointStore::new(layout.into(), vec![255, 200, 200, 255]).unwrap();
+    let mut store = store.with_bent([vec![128, 170, 86, 128], vec![128; 4]]).unwrap();
+    let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
+    let mut subscriber = Subscriber::new(None, Limits::default());
+    let snapshot = publisher.publish(&store).unwrap();
+    let change = BentChange { point: 1, old: BentNormal([170, 128]), new: BentNormal([170, 150]) };
+    store.apply_bent(&[change]).unwrap();
+    store.apply(&[Change { point: 2, visibility: 150 }]).unwrap();
+    let delta = publisher.publish(&store).unwrap();
+    assert_eq!(hex(&vector("bent")), hex(&snapshot.bytes));
+    assert_eq!(hex(&vector("bend")), hex(&delta.bytes));
+    assert_eq!(subscriber.receive(&vector("bent")), Ok(Applied::NewLayout));
+    let list = vec![ValueChange { point: 2, old: 200, new: 150 }];
+    assert_eq!(subscriber.receive(&vector("bend")), Ok(Applied::Changes(list)));
+    assert_eq!(subscriber.bent_changes(), [change]);
+    assert!(common::same_bits(subscriber.store().unwrap(), &store));
+    // The surface looks along z, whose tangents are x and y.
+    let direction = store.bent_of(1).unwrap().unpack(store.layout().sets()[0].normals[1]);
+    let expected = glam::Vec3::new(42.0 / 127.0, 22.0 / 127.0, 0.0);
+    assert!((direction.truncate() - expected.truncate()).length() < 1e-2 && direction.z > 0.9, "{direction}");
 }
 
 /// 64 points in a row, all of which go from 0 to 1.

@@ -80,6 +80,35 @@ proptest! {
     }
 }
 
+/// Bent normals that move with the values.
+fn bent(store: PointStore) -> PointStore {
+    let plane = |turn: u8| store.visibility().iter().map(|v| (v / 2 + 64).rotate_left(turn.into())).collect();
+    let planes = [plane(0), plane(1)];
+    store.with_bent(planes).unwrap()
+}
+
+#[test]
+fn bent_normals_are_within_the_limit_too_and_arrive_in_time() {
+    let start = bent(cloud::hall(11, 3000));
+    let precision = Precision { tolerance: TOLERANCE, step: 0 };
+    let config = PublisherConfig { precision, bent_precision: precision, ..PublisherConfig::default() };
+    let publisher = Publisher::new(SCENE, config);
+    let subscriber = Subscriber::new(Some(SCENE), Limits::default());
+    let mut ends = Ends { publisher, subscriber, start: start.clone() };
+    ends.publish(&start, &Spending::default());
+    let mut store = start;
+    for (seed, most) in [900, 1500, 60, 2500].into_iter().enumerate() {
+        store = bent(cloud::moved(&store, seed as u64, 0.2));
+        let bytes = ends.publish(&store, &Spending { most_bytes: Some(most), coarseness: &[] });
+        assert!(bytes <= most, "{bytes} of {most}");
+        assert!(most < 100 || bytes > most / 3, "{bytes} of {most}");
+    }
+    ends.publish(&store, &Spending::default());
+    let held = ends.publisher.store().unwrap().bent().unwrap();
+    let off = |(a, b): (&Vec<u8>, &Vec<u8>)| a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
+    assert!(held.iter().zip(store.bent().unwrap()).map(off).max().unwrap() <= TOLERANCE);
+}
+
 #[test]
 fn without_want_a_limit_changes_nothing() {
     let (mut free, mut limited) = (Ends::new(20_000, 0), Ends::new(20_000, 0));

@@ -47,7 +47,7 @@ pub(crate) struct EvalArgs {
     /// Run the small built-in setting and fail if similarity or bytes leave their bounds.
     #[arg(long, conflicts_with_all = [
         "scenes", "builtin", "suite", "detail", "animation", "methods", "frames", "size", "points", "hz", "path",
-        "seconds", "reference_rays", "supersample", "radius", "point_rays", "threshold", "seed", "adaptive",
+        "seconds", "reference_rays", "supersample", "radius", "point_rays", "threshold", "seed", "adaptive", "bent_normals", "gather_ambient",
         "ray_budget", "rays_still", "budget", "preset", "max_points", "hdr_flip", "record", "ppd",
     ])]
     pub(crate) smoke: bool,
@@ -137,6 +137,14 @@ pub(crate) struct Options {
     /// [default: 0].
     #[arg(long, value_name = "X")]
     pub(crate) adaptive: Option<f32>,
+    /// Points carry bent normals, two bytes each, and psao gathers ambient light from where it comes. Implies --gather-ambient
+    /// [default: false].
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL")]
+    pub(crate) bent_normals: Option<bool>,
+    /// In the truth's pictures ambient light is gathered from the directions that rays find open, instead of from about the normal
+    /// [default: false].
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL")]
+    pub(crate) gather_ambient: Option<bool>,
     /// Rays a server step may take, spent first on what is seen, on what changes and on what has waited; the rest is done
     /// in later steps [default: as many as it takes].
     #[arg(long, value_name = "RAYS")]
@@ -184,6 +192,8 @@ impl Options {
             threshold: self.threshold.or(other.threshold),
             seed: self.seed.or(other.seed),
             adaptive: self.adaptive.or(other.adaptive),
+            bent_normals: self.bent_normals.or(other.bent_normals),
+            gather_ambient: self.gather_ambient.or(other.gather_ambient),
             ray_budget: self.ray_budget.or(other.ray_budget),
             rays_still: self.rays_still.or(other.rays_still),
             budget: self.budget.or(preset.map(Preset::budget)).or(other.budget),

@@ -54,7 +54,7 @@ pub(crate) struct ServeArgs {
     )]
     pub(crate) token: Vec<Token>,
     /// Trace nothing here, but put together what so many workers trace (dapple worker).
-    #[arg(long, value_name = "N", conflicts_with_all = ["max_points", "threads"])]
+    #[arg(long, value_name = "N", conflicts_with_all = ["max_points", "threads", "bent_normals"])]
     pub(crate) workers: Option<u32>,
     /// A secret that workers must give.
     #[arg(long, value_name = "SECRET", env = "DAPPLE_WORKER_TOKEN", hide_env_values = true)]

@@ -6,6 +6,7 @@ use anyhow::{Context, Result, bail};
 use dapple_client::paper::PaperClient;
 use dapple_client::{Client, Drawn, Reconstruction};
 use dapple_render::psao::{Hat, Kernel};
+use dapple_scene::glam::Vec3;
 use dapple_scene::{PosedCamera, Scene};
 use dapple_server::Server;
 use dapple_server::paper::{Look, PaperConfig, PaperServer};
@@ -250,6 +251,16 @@ impl AnyClient {
             (AnyClient::Sas(client), Method::Sas { .. }) => client.visibility(drawn),
             _ => bail!("{method} does not belong to this client"),
         })
+    }
+
+    /// What each sample reflects from the surroundings, where the client knows better than by the sample's own normal.
+    pub(super) fn ambient(&self, drawn: &Drawn, stage: &Stage<'_>, visibility: &[f32]) -> Option<Vec<Vec3>> {
+        match self {
+            AnyClient::Own(client) => {
+                client.ambient(drawn, &stage.camera_at(drawn), stage.shade(), visibility)
+            }
+            _ => None,
+        }
     }
 
     /// Makes what is made once a session.

@@ -292,7 +292,16 @@ impl Line {
     ) -> Result<()> {
         let visibility = self.look(stage, pair, &frame.drawn, frame.time_s)?;
         self.rays += self.rays_of_look;
-        let shown = Shown::new(&frame.drawn, visibility.as_deref())?;
+        let ambient = match (self.method, pair, &visibility) {
+            (Method::Psao, Some(pair), Some(visibility)) => {
+                let start = Instant::now();
+                let ambient = pair.client.ambient(&frame.drawn, stage, visibility);
+                self.reconstruct_seconds += start.elapsed().as_secs_f64();
+                ambient
+            }
+            _ => None,
+        };
+        let shown = Shown::new(&frame.drawn, ambient.as_deref(), visibility.as_deref())?;
         let touched = |pixel: usize| frame.still.touched[pixel];
         let compared = Compared::new(&frame.truth, &shown, desk.judge, stage.settings.hdr_flip, touched)?;
         let stem = format!("{}/{number:03}-{}", desk.folder, self.method);
@@ -373,6 +382,11 @@ impl Line {
             point_rays: pair.map(|_| settings.point_rays),
             threshold: of_points.map(|s| s.threshold),
             adaptive: of_points.map(|s| s.adaptive).filter(|adaptive| *adaptive > 0.0),
+            bent_normals: of_points
+                .filter(|_| self.method == Method::Psao)
+                .map(|s| s.bent_normals)
+                .filter(|b| *b),
+            gather_ambient: Some(settings.gather_ambient).filter(|gathers| *gathers),
             ray_budget: of_points.and_then(|s| s.step.ray_budget),
             rays_still: of_points.map(|s| s.step.rays_still).filter(|rays| *rays > 0),
             budget_kbit_per_s: of_points

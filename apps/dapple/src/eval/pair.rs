@@ -5,7 +5,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use dapple_scene::{CameraPath, Pose, Scene};
 use dapple_server::{Progress, Server, ServerConfig};
-use dapple_stream::{Precision, PublisherConfig, Recorder, RecordingHeader};
+use dapple_stream::{Recorder, RecordingHeader};
 use dapple_trace::Tracer;
 use dapple_trace::psao::generate::{GenerateParams, generate_points};
 use dapple_trace::psao::update::{ConvexVolume, StepInput, UpdateParams};
@@ -14,7 +14,7 @@ use super::ends::{AnyClient, AnyServer};
 use super::results::Steps;
 use super::stage::Stage;
 use crate::args::StepArgs;
-use crate::light::microseconds;
+use crate::light::{microseconds, publish};
 
 /// Servers at their start are kept for other rates and paths while they have no more points than this together.
 const MAX_KEPT_POINTS: usize = 6_000_000;
@@ -41,6 +41,7 @@ impl Start {
                 rays: settings.point_rays,
                 radius_m: stage.radius_m,
                 rays_still: settings.step.rays_still,
+                bent_normals: settings.bent_normals,
             },
             tolerance: settings.threshold,
             seed: settings.seed,
@@ -57,12 +58,10 @@ impl Start {
             radius_m: self.update.radius_m,
             ..GenerateParams::default()
         };
-        let precision = Precision { tolerance: self.tolerance, ..Precision::default() };
-        let publish = PublisherConfig { precision, ..PublisherConfig::default() };
         ServerConfig {
             generate,
             update: self.update,
-            publish,
+            publish: publish(self.tolerance),
             max_resident_points: self.max_points,
             ..ServerConfig::default()
         }

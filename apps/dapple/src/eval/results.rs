@@ -234,6 +234,12 @@ pub(crate) struct Params {
     /// How far the density of points follows the gradient of visibility; absent where it is uniform.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) adaptive: Option<f32>,
+    /// Whether points carry bent normals; absent where they do not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) bent_normals: Option<bool>,
+    /// Whether the truth gathers ambient light from the directions that are open; absent where it does not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) gather_ambient: Option<bool>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) ray_budget: Option<u64>,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -247,6 +247,7 @@ impl Run<'_> {
             "reference_rays": settings.reference_rays,
             "radius": [stage.radius_m, stage.density_factor],
             "seed": settings.seed,
+            "gather_ambient": settings.gather_ambient,
         })
     }
 
@@ -312,6 +313,8 @@ impl Run<'_> {
             "ray_budget": settings.step.ray_budget,
             "budget": settings.step.budget.map(|budget| budget.0),
             "max_points": settings.step.max_points,
+            "adaptive": settings.adaptive,
+            "bent_normals": settings.bent_normals,
             "hdr_flip": settings.hdr_flip,
             // Says how long flicker is watched.
             "slowest_hz": settings.slowest_hz(),

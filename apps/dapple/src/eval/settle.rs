@@ -74,7 +74,7 @@ struct Look {
 impl Look {
     fn new(pair: &Pair, method: Method, frame: &Frame, since: usize) -> Result<Look> {
         let samples = pair.client.visibility(&frame.drawn, method)?;
-        let visibility = Shown::new(&frame.drawn, Some(&samples))?.into_visibility();
+        let visibility = Shown::new(&frame.drawn, None, Some(&samples))?.into_visibility();
         let psnr_db = match frame.truth.covered_pixels {
             0 => f64::INFINITY,
             _ => psnr_masked(frame.truth.visibility(), &visibility, frame.truth.covered(), 1.0)?,

@@ -5,12 +5,13 @@ use std::rc::Rc;
 
 use anyhow::Result;
 use dapple_client::{Drawn, PictureParams, draw};
+use dapple_render::shade::{Gathering, Openings, ShadeParams, shade_gathered};
 use dapple_scene::{CameraPath, PosedCamera, Scene};
 use dapple_trace::Tracer;
 
 use super::plan::{CLIENT_HZ, Settings};
 use super::still::{StillMap, still_map};
-use super::truth::{Cache, Request};
+use super::truth::{Cache, Request, open_directions};
 use crate::picture::Shown;
 use crate::source::Loaded;
 
@@ -181,13 +182,24 @@ impl<'a> Stage<'a> {
             seed: self.settings.seed,
         };
         let traced = cache.get(&request, || self.tracer_at(&drawn), progress)?;
-        let truth = Shown::new(&drawn, Some(&traced.visibility))?;
+        let ambient = self.settings.gather_ambient.then(|| {
+            let open_world = open_directions(&request, &self.tracer_at(&drawn));
+            let openings = Openings::Traced(&open_world);
+            let gathering = Gathering { visibility: &traced.visibility, openings };
+            shade_gathered(scene, &drawn.pose, &camera, &drawn.gbuffer, self.shade(), gathering)
+        });
+        let truth = Shown::new(&drawn, ambient.as_deref(), Some(&traced.visibility))?;
         // What the client shows first may be a step old: what moved since then is no flicker when it arrives.
         let before =
             (1..=self.client_frames_a_step().min(MAX_WATCHED)).map(|k| time_s - f64::from(k) / CLIENT_HZ);
         let times_s: Vec<f64> = before.filter(|t| *t >= 0.0).chain(watched_s.iter().copied()).collect();
         let still = still_map(scene, &drawn, &times_s, &self.moving, self.radius_m);
         Ok(Frame { time_s, drawn, truth, noise_mse: traced.noise_mse, watched_s: watched_s.to_vec(), still })
+    }
+
+    /// How pictures are shaded.
+    pub(super) fn shade(&self) -> &ShadeParams {
+        &self.params.shade
     }
 
     /// The camera that a picture of the path was drawn with.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use dapple_client::Drawn;
 use dapple_scene::Scene;
+use dapple_scene::glam::Vec3;
 use dapple_trace::Tracer;
 use dapple_trace::rtao::{RtaoParams, Site, trace_visibility, trace_visibility_with_progress};
 
@@ -105,6 +106,12 @@ impl Cache {
         };
         Ok(assemble(request, &indices, &again, &counts))
     }
+}
+
+/// Mean of the directions that are open over each sample, by the very rays of its visibility; zero where there is nothing. It is not kept.
+pub(super) fn open_directions(request: &Request<'_>, tracer: &Tracer) -> Vec<Vec3> {
+    let (indices, sites) = sites(request.scene, request.drawn);
+    crate::picture::open_directions(request.drawn, tracer, (&indices, &sites), &request.params(STREAM))
 }
 
 /// Whether some of the sites, traced again, give what the file says.

@@ -258,7 +258,8 @@ impl Viewer {
 
     /// Figures for an overlay. Looks at all that is held: a few times a second is enough.
     pub fn stats(&self) -> ViewerStats {
-        let store_bytes = self.stats.points as u64 * BYTES_A_STORED_POINT;
+        let bent = self.store().and_then(PointStore::bent).map_or(0, |planes| planes.len() as u64);
+        let store_bytes = self.stats.points as u64 * (BYTES_A_STORED_POINT + bent);
         let stream_bytes = self.light.subscriber.bytes() as u64;
         let (atlas_bytes, texels) =
             self.light.atlas.as_ref().map_or((0, 0), |a| (a.memory_bytes(), a.texel_count() as u32));

@@ -27,15 +27,29 @@ pub fn compose(
     gbuffer: &GBuffer,
     visibility: Option<&[f32]>,
 ) -> Result<LinearImage, RenderError> {
+    compose_with(&shaded.ambient, shaded, gbuffer, visibility)
+}
+
+/// As [`compose`] with other ambient radiance than is in `shaded`, one a sample
+/// ([`shade_gathered`](crate::shade::shade_gathered)).
+///
+/// # Errors
+/// As there.
+pub fn compose_with(
+    ambient: &[Vec3],
+    shaded: &Shaded,
+    gbuffer: &GBuffer,
+    visibility: Option<&[f32]>,
+) -> Result<LinearImage, RenderError> {
     let expected = gbuffer.samples().len();
-    RenderError::check_length("ambient radiance", shaded.ambient.len(), expected)?;
+    RenderError::check_length("ambient radiance", ambient.len(), expected)?;
     RenderError::check_length("direct radiance", shaded.direct.len(), expected)?;
     if let Some(visibility) = visibility {
         RenderError::check_length("visibility", visibility.len(), expected)?;
     }
     let radiance = |i: usize| {
         let open = visibility.map_or(1.0, |v| v[i]);
-        shaded.direct[i] + shaded.ambient[i] * open
+        shaded.direct[i] + ambient[i] * open
     };
     let scale = 1.0 / (gbuffer.samples_per_axis * gbuffer.samples_per_axis) as f32;
     let pixels = gbuffer.map_pixels(|samples| samples.fold(Vec3::ZERO, |sum, i| sum + radiance(i)) * scale);

@@ -96,6 +96,18 @@ impl GBuffer {
         Found::new(scene, sample).map(|found| found.rest_surface())
     }
 
+    /// How the triangle that a sample sees has turned since rest: takes directions in rest space to the world, as the triangle carries
+    /// them along without stretching them. `None` as in [`GBuffer::surface`], and where the triangle has collapsed.
+    pub fn world_from_rest(&self, scene: &Scene, pose: &Pose, sample_index: usize) -> Option<Mat3> {
+        let sample = self.samples.get(sample_index).filter(|s| s.is_covered())?;
+        let found = Found::new(scene, sample)?;
+        let corners_rest = found.indices.map(|v| found.rest_from_mesh * found.mesh.positions[v as usize]);
+        let corners_world = world_triangle(scene, pose, sample.instance as usize, sample.triangle as usize)?;
+        let linear = Mat3::from(pose.instances.get(sample.instance as usize)?.world_from_mesh.matrix3);
+        let rest = frame(&corners_rest, found.rest_from_mesh.determinant() < 0.0)?;
+        Some(frame(&corners_world, linear.determinant() < 0.0)? * rest.transpose())
+    }
+
     /// Where the place on the mesh that a sample sees is in its instance's local space at `pose`, which may be of another time
     /// than the one drawn ([Neff2023] sec. 3.5); `None` as in [`GBuffer::surface`].
     pub fn surface_local(&self, scene: &Scene, pose: &Pose, sample_index: usize) -> Option<LocalSurface> {
@@ -147,6 +159,15 @@ impl GBuffer {
         let indices = (0..self.samples.len()).into_par_iter().with_min_len(1024);
         indices.map(|i| f(i, self.surface_rest(scene, i).as_ref())).collect()
     }
+}
+
+/// Axes of a triangle: along its first edge, into it, and its front's normal, which the first two make unless they are those of a mirrored
+/// one.
+fn frame([a, b, c]: &[Vec3; 3], mirrored: bool) -> Option<Mat3> {
+    let (ab, ac) = (*b - *a, *c - *a);
+    let tangent = ab.try_normalize()?;
+    let face = ab.cross(ac).try_normalize()?;
+    Some(Mat3::from_cols(tangent, face.cross(tangent), if mirrored { -face } else { face }))
 }
 
 /// A sample with what it refers to in the scene.

@@ -77,10 +77,10 @@ impl Reflectance {
         0.5 / (lambda(n_dot_l, n_dot_v) + lambda(n_dot_v, n_dot_l))
     }
 
-    /// Radiance reflected from the surroundings, unoccluded.
-    pub(super) fn ambient(&self, ambient: &Ambient, normal: Vec3, to_viewer: Vec3) -> Vec3 {
+    /// Radiance reflected from the surroundings, unoccluded; the diffuse part has `gathered` this much.
+    pub(super) fn ambient(&self, ambient: &Ambient, gathered: Vec3, normal: Vec3, to_viewer: Vec3) -> Vec3 {
         // Irradiance π L times albedo / π.
-        let diffuse = self.diffuse * ambient.radiance(normal);
+        let diffuse = self.diffuse * gathered;
         if !self.specular {
             return diffuse;
         }

@@ -3,6 +3,7 @@
 //! Takes a scene, pose, camera, G-buffer and shadow maps; returns two radiances a sample. Equations in the README.
 
 mod brdf;
+mod gathered;
 mod light;
 mod shadow;
 #[cfg(test)]
@@ -15,6 +16,7 @@ use rayon::prelude::*;
 use crate::gbuffer::{GBuffer, Surface};
 use crate::texture;
 use brdf::Reflectance;
+pub use gathered::{Gathering, Openings, shade_gathered};
 pub use light::light_irradiance;
 pub(crate) use light::{ActiveLight, active_lights};
 #[cfg(all(test, feature = "gpu"))]
@@ -72,7 +74,7 @@ pub enum Ambient {
 }
 
 impl Ambient {
-    /// Radiance about a unit direction.
+    /// Radiance about a unit direction: what an open surface gathers that looks there.
     pub fn radiance(&self, direction_world: Vec3) -> Vec3 {
         match *self {
             Ambient::Constant(radiance) => radiance,
@@ -132,7 +134,8 @@ fn shade_surface(
     }
     let reflectance = Reflectance::of(scene, material, &surface.uv, base_color, params.specular);
     let normal = surface.normal_shading_world;
-    let ambient = reflectance.ambient(&params.ambient, normal, to_viewer_world);
+    let gathered = params.ambient.radiance(normal);
+    let ambient = reflectance.ambient(&params.ambient, gathered, normal, to_viewer_world);
     let mut direct = texture::emission(scene, material, &surface.uv);
     for (i, light) in lights.iter().enumerate() {
         let arriving = light.arriving(surface.position_world);

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use super::layout::MAX_POINTS;
-use super::{LayoutError, PointLayout, PointSet, PointStore};
+use super::{BentNormal, LayoutError, PointLayout, PointSet, PointStore};
 
 /// Which sets make the difference between two layouts of the same lengths. A set whose points differ goes and comes.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -109,23 +109,35 @@ impl PointStore {
         Ok(self.carried(layout, added))
     }
 
-    /// Values for the points of `layout`: of `added` where that has the set, else this store's, else open.
+    /// Values for the points of `layout`: of `added` where that has the set, else this store's, else open. With bent normals if either
+    /// has some; what has none is unbent.
     ///
     /// A set with another number of points than here counts as one that is not there.
     pub fn carried(&self, layout: Arc<PointLayout>, added: &PointStore) -> PointStore {
-        let mut values = Vec::with_capacity(layout.len());
-        for set in layout.sets() {
-            let same = |store: &'_ PointStore| {
-                let found = store.layout().set_of_instance(set.instance).filter(|f| f.len() == set.len());
-                found.map(|f| f.first as usize..f.first as usize + f.len())
-            };
-            match (same(added), same(self)) {
-                (Some(range), _) => values.extend_from_slice(&added.visibility()[range]),
-                (None, Some(range)) => values.extend_from_slice(&self.visibility()[range]),
-                (None, None) => values.resize(values.len() + set.len(), 255),
+        let carry = |of: &dyn Fn(&PointStore) -> Option<&[u8]>, otherwise: u8| {
+            let mut values = Vec::with_capacity(layout.len());
+            for set in layout.sets() {
+                let same = |store: &PointStore| {
+                    let found = store.layout().set_of_instance(set.instance).filter(|f| f.len() == set.len());
+                    found.map(|f| f.first as usize..f.first as usize + f.len())
+                };
+                let (store, range) = match (same(added), same(self)) {
+                    (Some(range), _) => (added, range),
+                    (None, Some(range)) => (self, range),
+                    (None, None) => (added, 0..0),
+                };
+                values.extend_from_slice(of(store).map_or(&[], |plane| &plane[range]));
+                values.resize(set.first as usize + set.len(), otherwise);
             }
-        }
-        PointStore::new(layout, values).expect("each set has given a value for each of its points")
+            values
+        };
+        let visibility = carry(&|store| Some(store.visibility.as_slice()), 255);
+        let has_bent = self.bent.is_some() || added.bent.is_some();
+        let plane = |k: usize| {
+            carry(&|store| store.bent.as_ref().map(|planes| planes[k].as_slice()), BentNormal::UNBENT.0[k])
+        };
+        let bent = has_bent.then(|| Box::new([plane(0), plane(1)]));
+        PointStore { layout, visibility, bent }
     }
 }
 

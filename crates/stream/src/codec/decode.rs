@@ -1,12 +1,15 @@
 //! Payloads → layouts, values and changes. Total: any bytes give a value or an error, within [`Limits`].
 
+use std::sync::Arc;
+
 use dapple_store::charts::{Cuts, SetCuts, SiteCut};
-use dapple_store::points::{MAX_POINTS, PointLayout, PointSet};
+use dapple_store::points::{MAX_POINTS, PointLayout, PointSet, PointStore};
 use glam::Vec3;
 
 use super::columns::{CutColumns, PointColumns};
 use super::entropy::{self, Coder};
-use super::values::{Guide, MOST_FOLLOW, Near, Scale, Scratch, ValueChange, code_changes, code_values};
+use super::planes::{Changes, HAS_BENT, PLANES, planes};
+use super::values::{Guide, MOST_FOLLOW, Near, Scale, Scratch, code_changes, code_values};
 use super::varint::Reader;
 use super::{DecodeError, Limits};
 
@@ -29,6 +32,8 @@ pub(crate) struct DecodedLayout {
     pub(crate) cuts: Cuts,
     /// Bits of a coordinate within its cell.
     pub(crate) local_bits: u32,
+    /// Whether values come with bent normals.
+    pub(crate) has_bent: bool,
 }
 
 pub(crate) fn parse_snapshot(payload: &[u8]) -> Result<SnapshotParts<'_>, DecodeError> {
@@ -45,7 +50,8 @@ pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<DecodedLayo
     let mut reader = Reader::new(bytes);
     let quantum_m = reader.f32("layout lengths")?;
     let spacing_m = reader.f32("layout lengths")?;
-    let local_bits = u32::from(reader.byte("layout local bits")?);
+    let flags = reader.byte("layout local bits")?;
+    let (local_bits, has_bent) = (u32::from(flags & !HAS_BENT), flags & HAS_BENT != 0);
     if local_bits > 8 {
         return Err(bad("layout local bits", "exceed 8"));
     }
@@ -98,7 +104,7 @@ pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<DecodedLayo
     // A mask of 0 is found here.
     let cuts = Cuts::new(cut_sets).map_err(|error| bad("cut masks", error.reason))?;
     let layout = PointLayout::new(quantum_m, spacing_m, sets)?;
-    Ok(DecodedLayout { layout, cuts, local_bits })
+    Ok(DecodedLayout { layout, cuts, local_bits, has_bent })
 }
 
 /// The table of sets of cuts, still without cuts, and how many each has: together within the limits.
@@ -170,14 +176,26 @@ fn decode_sets(reader: &mut Reader<'_>, limits: &Limits) -> Result<(Vec<PointSet
 }
 
 /// The values of a layout's points.
-pub(crate) fn decode_values(bytes: &[u8], layout: &PointLayout, near: &Near) -> Result<Vec<u8>, DecodeError> {
+pub(crate) fn decode_values(
+    bytes: &[u8],
+    layout: Arc<PointLayout>,
+    near: &Near,
+    has_bent: bool,
+) -> Result<PointStore, DecodeError> {
     let bad = |reason| DecodeError::Malformed { part: "values", reason };
     let mut reader = entropy::Reader::new(bytes);
-    let values = code_values(&mut reader, layout, near, |_| 0).map_err(bad)?;
+    let mut plane = || code_values(&mut reader, &layout, near, |_| 0).map_err(bad);
+    let visibility = plane()?;
+    let bent = if has_bent { Some([plane()?, plane()?]) } else { None };
     if !reader.is_complete() {
         return Err(bad("have bytes after their end"));
     }
-    Ok(values)
+    let misfit = |_| bad("do not fit the layout");
+    let store = PointStore::new(layout, visibility).map_err(misfit)?;
+    match bent {
+        Some(bent) => store.with_bent(bent).map_err(misfit),
+        None => Ok(store),
+    }
 }
 
 /// Splits the payload of a delta whose frame carries `epoch`.
@@ -205,31 +223,42 @@ impl Guide for Read {
     }
 }
 
-/// What a delta changes of `values`, in order of point.
+/// What a delta changes of `held`.
 pub(crate) fn decode_changes(
     parts: &DeltaParts<'_>,
-    layout: &PointLayout,
+    held: &PointStore,
     near: &mut Near,
-    values: &[u8],
     scratch: &mut Scratch,
-) -> Result<Vec<ValueChange>, DecodeError> {
+) -> Result<Changes, DecodeError> {
     let bad = |part, reason| DecodeError::Malformed { part, reason };
     let mut reader = parts.changes;
-    let scale = Scale { step: reader.byte("step")?, follow: reader.byte("share")? };
-    if scale.step == 0 {
-        return Err(bad("step", "is 0"));
+    let which = if held.bent().is_some() { reader.byte("planes")? } else { 1 };
+    if which == 0 || which >> PLANES != 0 {
+        return Err(bad("planes", "are none, or others than there are"));
     }
-    if scale.follow > MOST_FOLLOW {
-        return Err(bad("share", "exceeds 2"));
+    let mut scales = [None; PLANES];
+    for (_, scale) in (0..).zip(&mut scales).filter(|(plane, _)| which >> plane & 1 == 1) {
+        let Scale { step, follow } =
+            *scale.insert(Scale { step: reader.byte("step")?, follow: reader.byte("share")? });
+        if step == 0 {
+            return Err(bad("step", "is 0"));
+        }
+        if follow > MOST_FOLLOW {
+            return Err(bad("share", "exceeds 2"));
+        }
     }
     let mut coded = entropy::Reader::new(reader.take(reader.len(), "changes")?);
-    let changes = code_changes(&mut coded, (layout, near), values, scale, &mut Read, scratch)
-        .ok_or(bad("changes", "end early"))?;
-    if changes.is_empty() {
-        return Err(bad("changes", "are none"));
+    let mut changes = [const { Vec::new() }; PLANES];
+    for ((values, scale), changes) in planes(held).zip(scales).zip(&mut changes) {
+        let Some(scale) = scale else { continue };
+        *changes = code_changes(&mut coded, (held.layout(), near), values, scale, &mut Read, scratch)
+            .ok_or(bad("changes", "end early"))?;
+        if changes.is_empty() {
+            return Err(bad("changes", "are none"));
+        }
     }
     if !coded.is_complete() {
         return Err(bad("changes", "have bytes after their end"));
     }
-    Ok(changes)
+    Ok(Changes::new(changes, held))
 }

@@ -1,11 +1,12 @@
 //! Stores and changes → payloads. Deterministic: the same input gives the same bytes.
 
 use dapple_store::charts::Cuts;
-use dapple_store::points::PointLayout;
+use dapple_store::points::{PointLayout, PointStore};
 
 use super::columns::{CutColumns, PointColumns};
 use super::entropy::Writer;
-use super::values::{Fit, Goal, Near, Scratch, ValueChange, code_changes, code_values};
+use super::planes::{Changes, HAS_BENT, PLANES, planes};
+use super::values::{Fit, Goal, Near, Scratch, code_changes, code_values};
 use super::varint::write_varint;
 
 /// Most bits of a coordinate within its cell: they are coded as one byte.
@@ -21,13 +22,13 @@ pub(crate) struct EncodedLayout {
     pub(crate) local_bits: u32,
 }
 
-/// The layout part of a snapshot.
-pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts) -> EncodedLayout {
+/// The layout part of a snapshot, which says whether bent normals come with the values.
+pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts, has_bent: bool) -> EncodedLayout {
     let local_bits = local_bits(layout);
     let mut out = Vec::new();
     out.extend(layout.quantum_m().to_le_bytes());
     out.extend(layout.spacing_m().to_le_bytes());
-    out.push(local_bits as u8);
+    out.push(local_bits as u8 | if has_bent { HAS_BENT } else { 0 });
     write_varint(&mut out, layout.sets().len() as u64);
     let mut next_instance = 0;
     for set in layout.sets() {
@@ -73,52 +74,58 @@ pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts) -> EncodedLayout 
     EncodedLayout { bytes, cut_bytes, local_bits }
 }
 
-/// The payload of a snapshot; `encoded` is what [`encode_layout`] gave for `layout`, `visibility` one value a point.
+/// The payload of a snapshot; `encoded` is what [`encode_layout`] gave for the layout of `store`.
 pub(crate) fn snapshot_payload(
     scene_hash: &[u8; 32],
     encoded: &EncodedLayout,
-    (layout, near): (&PointLayout, &Near),
-    visibility: &[u8],
+    near: &Near,
+    store: &PointStore,
 ) -> Vec<u8> {
-    let mut out = Vec::with_capacity(encoded.bytes.len() + visibility.len() / 2 + 64);
+    let mut out = Vec::with_capacity(encoded.bytes.len() + store.value_bytes() / 2 + 64);
     out.extend(scene_hash);
     write_varint(&mut out, encoded.bytes.len() as u64);
     out.extend(&encoded.bytes);
+    append_values(out, near, store)
+}
+
+/// The values of a snapshot, appended to `out`.
+pub(super) fn append_values(out: Vec<u8>, near: &Near, store: &PointStore) -> Vec<u8> {
     let mut writer = Writer::new(out);
-    code_values(&mut writer, layout, near, |point| visibility[point]).expect("only reading fails");
+    for plane in planes(store) {
+        code_values(&mut writer, store.layout(), near, |point| plane[point]).expect("only reading fails");
+    }
     writer.finish()
 }
 
-/// The payload of a delta that brings `held` to within the goal, and what it changes. `epochs_back` is the distance from the
-/// frame's epoch to that of `held`, at least 1.
-pub(crate) fn delta_payload(
-    epochs_back: u64,
-    (layout, near): (&PointLayout, &mut Near),
-    held: &[u8],
-    goal: Goal<'_>,
-    fit: &mut Fit,
-    scratch: &mut Scratch,
-) -> (Vec<u8>, Vec<ValueChange>) {
-    let mut out = Vec::new();
-    write_varint(&mut out, epochs_back);
-    append_changes(out, (layout, near), held, goal, fit, scratch)
-}
-
-/// What a delta has after its base, appended to `out`.
+/// What a delta has after its base, appended to `out`: `held` to within the goals of its planes, of which one at least is set. Where
+/// there are no bent normals, theirs are not.
 pub(crate) fn append_changes(
     mut out: Vec<u8>,
-    (layout, near): (&PointLayout, &mut Near),
-    held: &[u8],
-    mut goal: Goal<'_>,
-    fit: &mut Fit,
+    near: &mut Near,
+    held: &PointStore,
+    mut goals: [Option<Goal<'_>>; PLANES],
+    fits: &mut [Fit; PLANES],
     scratch: &mut Scratch,
-) -> (Vec<u8>, Vec<ValueChange>) {
-    let scale = goal.scale(fit);
-    out.extend([scale.step, scale.follow]);
+) -> (Vec<u8>, Changes) {
+    if held.bent().is_some() {
+        out.push((0..).zip(&goals).map(|(plane, goal)| u8::from(goal.is_some()) << plane).sum());
+    }
+    for (goal, fit) in goals.iter().zip(&*fits) {
+        out.extend(goal.iter().flat_map(|goal| {
+            let scale = goal.scale(fit);
+            [scale.step, scale.follow]
+        }));
+    }
     let mut writer = Writer::new(out);
-    let changes = code_changes(&mut writer, (layout, near), held, scale, &mut goal, scratch);
-    fit.learn(&goal);
-    (writer.finish(), changes.unwrap_or_default())
+    let mut changes = [const { Vec::new() }; PLANES];
+    for (k, values) in planes(held).enumerate() {
+        let Some(goal) = &mut goals[k] else { continue };
+        let scale = goal.scale(&fits[k]);
+        let coded = code_changes(&mut writer, (held.layout(), near), values, scale, goal, scratch);
+        changes[k] = coded.unwrap_or_default();
+        fits[k].learn(goal);
+    }
+    (writer.finish(), Changes::new(changes, held))
 }
 
 /// Bits of a coordinate within its cell, so that a cell is about as large as the points are apart: then most

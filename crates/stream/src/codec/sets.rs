@@ -4,16 +4,12 @@
 //! delta on top of it.
 
 use dapple_store::charts::Cuts;
-use dapple_store::points::{MAX_POINTS, PointLayout, PointStore};
+use dapple_store::points::{MAX_POINTS, PointStore};
 
 use super::decode::{DecodedLayout, DeltaParts, decode_layout, decode_values};
 #[cfg(feature = "publish")]
-use super::encode::encode_layout;
-#[cfg(feature = "publish")]
-use super::entropy::Writer;
+use super::encode::{append_values, encode_layout};
 use super::values::Near;
-#[cfg(feature = "publish")]
-use super::values::code_values;
 #[cfg(feature = "publish")]
 use super::varint::write_varint;
 use super::{DecodeError, Limits};
@@ -34,14 +30,11 @@ pub(crate) fn sets_head(epochs_back: u64, gone: &[u32], added: &PointStore, cuts
         out.push(0);
         return out;
     }
-    let encoded = encode_layout(layout, cuts);
+    let encoded = encode_layout(layout, cuts, added.bent().is_some());
     write_varint(&mut out, encoded.bytes.len() as u64);
     out.extend(&encoded.bytes);
     let near = Near::new(layout, encoded.local_bits);
-    let mut writer = Writer::new(Vec::new());
-    let visibility = added.visibility();
-    code_values(&mut writer, layout, &near, |point| visibility[point]).expect("only reading fails");
-    let values = writer.finish();
+    let values = append_values(Vec::new(), &near, added);
     write_varint(&mut out, values.len() as u64);
     out.extend(values);
     out
@@ -58,14 +51,15 @@ pub(crate) struct DecodedSets<'a> {
     pub(crate) changes: Option<DeltaParts<'a>>,
 }
 
-/// Reads the payload of a frame that builds on `held`, after the base epoch, which `parse_delta` has read. `local_bits` are those of
-/// the layout that is held, and `cuts` are its cuts.
+/// Reads the payload of a frame that builds on a store, after the base epoch, which `parse_delta` has read. `local_bits` are those of
+/// the store's layout, and `cuts` are its cuts.
 pub(crate) fn decode_sets_change<'a>(
     parts: &DeltaParts<'a>,
-    (held, cuts, local_bits): (&PointLayout, &Cuts, u32),
+    (store, cuts, local_bits): (&PointStore, &Cuts, u32),
     limits: &Limits,
 ) -> Result<DecodedSets<'a>, DecodeError> {
     let bad = |part, reason| DecodeError::Malformed { part, reason };
+    let held = store.layout();
     let mut reader = parts.changes;
     let part = "sets that go";
     let count = reader.varint(part)?;
@@ -104,13 +98,11 @@ pub(crate) fn decode_sets_change<'a>(
             ..*limits
         };
         let decoded = decode_layout(layout_bytes, &left)?;
-        check_fit(&decoded, (held, local_bits), &gone)?;
-        let DecodedLayout { layout, cuts, .. } = decoded;
+        check_fit(&decoded, (store, local_bits), &gone)?;
+        let DecodedLayout { layout, cuts, has_bent, .. } = decoded;
         let near = Near::new(&layout, local_bits);
         let value_bytes = size(reader.varint("values")?);
-        let values = decode_values(reader.take(value_bytes, "values")?, &layout, &near)?;
-        let added =
-            PointStore::new(layout.into(), values).map_err(|_| bad("values", "do not fit the layout"))?;
+        let added = decode_values(reader.take(value_bytes, "values")?, layout.into(), &near, has_bent)?;
         (added, cuts)
     };
     let changes =
@@ -125,13 +117,16 @@ fn less(limit: u32, taken: u64) -> u32 {
 /// Whether what comes can stand beside what stays.
 fn check_fit(
     decoded: &DecodedLayout,
-    (held, local_bits): (&PointLayout, u32),
+    (store, local_bits): (&PointStore, u32),
     gone: &[u32],
 ) -> Result<(), DecodeError> {
     let bad = |reason| Err(DecodeError::Malformed { part: "sets that come", reason });
-    let added = &decoded.layout;
+    let (added, held) = (&decoded.layout, store.layout());
     if !added.has_lengths_of(held) || decoded.local_bits != local_bits {
         return bad("have other lengths than the layout");
+    }
+    if decoded.has_bent != store.bent().is_some() {
+        return bad("have bent normals where others have none, or none where others have");
     }
     if added.sets().is_empty() {
         return bad("are none");

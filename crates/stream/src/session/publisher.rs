@@ -3,14 +3,14 @@
 use std::sync::{Arc, OnceLock};
 
 use dapple_store::charts::Cuts;
-use dapple_store::points::{Change, PointLayout, PointStore, SetsChange};
+use dapple_store::points::{PointLayout, PointStore, SetsChange};
 
 use super::precision::Precision;
-use super::sets::difference;
+use super::sets::{apply, difference};
 use super::within::{ENVELOPE_BYTES, Pressure, Search, Spending};
 use crate::codec::{
-    EncodedLayout, Fit, FrameKind, Goal, Near, Scratch, Tolerances, ValueChange, append_changes,
-    delta_payload, encode_layout, local_bits, seal, sets_head, snapshot_payload,
+    Changes, EncodedLayout, Fit, FrameKind, Goal, Near, PLANES, Scratch, Tolerances, append_changes,
+    encode_layout, local_bits, planes, seal, sets_head, snapshot_payload, varint::write_varint,
 };
 
 /// How a [`Publisher`] numbers and cuts its groups, and how exact its deltas are.
@@ -26,6 +26,15 @@ pub struct PublisherConfig {
     pub deltas_per_group: u32,
     /// How exact deltas are.
     pub precision: Precision,
+    /// How exact bent normals are in deltas, where what is published has some: in 127ths along each tangent.
+    pub bent_precision: Precision,
+}
+
+impl PublisherConfig {
+    /// Precisions within their ranges, by plane.
+    fn precisions(&self) -> [Precision; PLANES] {
+        [self.precision, self.bent_precision, self.bent_precision].map(Precision::in_range)
+    }
 }
 
 /// One frame, ready for any transport.
@@ -66,7 +75,8 @@ struct State {
     encoded: OnceLock<EncodedLayout>,
     near: Near,
     scratch: Scratch,
-    fit: Fit,
+    /// By plane.
+    fits: [Fit; PLANES],
     pressure: Pressure,
     group: u64,
     /// Epoch of the last change, not of the last call.
@@ -118,10 +128,12 @@ impl Publisher {
     pub fn publish_within(&mut self, store: &PointStore, spending: &Spending<'_>) -> Option<Frame> {
         let epoch = self.next_epoch;
         let (frame, changed) = match &mut self.state {
-            Some(state) if same_layout(state.store.layout(), store.layout()) => {
-                let precision = self.config.precision.in_range();
+            Some(state)
+                if same_layout(state.store.layout(), store.layout())
+                    && state.store.bent().is_some() == store.bent().is_some() =>
+            {
                 let full = self.config.deltas_per_group;
-                match state.encode_within(epoch, store.visibility(), precision, spending) {
+                match state.encode_within(epoch, store, self.config.precisions(), spending) {
                     None => (None, 0),
                     Some(delta) if full > 0 && state.deltas >= full => {
                         // To the same values as without a new group: what subscribers hold does not depend on when groups start.
@@ -142,24 +154,23 @@ impl Publisher {
                 {
                     let full = self.config.deltas_per_group;
                     let ends = full > 0 && state.deltas >= full;
-                    let precision = self.config.precision.in_range();
                     // Within a limit, what stays waits for the next frame.
-                    let precision = spending.most_bytes.is_none().then_some(precision);
-                    let (frame, changed) = state.change_sets(epoch, (store, cuts), &change, precision);
+                    let precisions = spending.most_bytes.is_none().then(|| self.config.precisions());
+                    let (frame, changed) = state.change_sets(epoch, (store, cuts), &change, precisions);
                     let frame = if ends { state.start_group(epoch, &self.scene_hash) } else { frame };
                     (self.next_epoch, self.changed) = (epoch + 1, changed as u32);
                     return Some(frame);
                 }
                 let group =
                     old.as_ref().map_or(self.config.first_group.min(u64::MAX >> 1), |state| state.group + 1);
-                let encoded = encode_layout(store.layout(), &cuts);
+                let encoded = encode_layout(store.layout(), &cuts, store.bent().is_some());
                 let state = State {
                     near: Near::new(store.layout(), encoded.local_bits),
                     store: store.clone(),
                     cuts,
                     encoded: OnceLock::from(encoded),
                     scratch: Scratch::default(),
-                    fit: Fit::default(),
+                    fits: Default::default(),
                     pressure: Pressure::default(),
                     group,
                     epoch,
@@ -189,7 +200,7 @@ impl Publisher {
     pub fn bytes(&self) -> usize {
         self.state.as_ref().map_or(0, |state| {
             let cuts = state.cuts.sets().iter().map(|set| size_of_val(set) + size_of_val(&set.cuts[..]));
-            state.store.visibility().len()
+            state.store.value_bytes()
                 + cuts.sum::<usize>()
                 + state.encoded.get().map_or(0, |encoded| encoded.bytes.capacity())
                 + state.near.bytes()
@@ -229,16 +240,12 @@ impl State {
     }
 
     fn encoded(&self) -> &EncodedLayout {
-        self.encoded.get_or_init(|| encode_layout(self.store.layout(), &self.cuts))
+        let has_bent = self.store.bent().is_some();
+        self.encoded.get_or_init(|| encode_layout(self.store.layout(), &self.cuts, has_bent))
     }
 
     fn payload(&self, scene_hash: &[u8; 32]) -> Vec<u8> {
-        snapshot_payload(
-            scene_hash,
-            self.encoded(),
-            (self.store.layout(), &self.near),
-            self.store.visibility(),
-        )
+        snapshot_payload(scene_hash, self.encoded(), &self.near, &self.store)
     }
 
     /// Puts the present values into a new group at `epoch`.
@@ -254,13 +261,15 @@ impl State {
     fn encode_within(
         &mut self,
         epoch: u64,
-        values: &[u8],
-        precision: Precision,
+        store: &PointStore,
+        precisions: [Precision; PLANES],
         spending: &Spending<'_>,
     ) -> Option<Delta> {
+        let exact = precisions.map(|Precision { tolerance, step }| (Tolerances::Even(tolerance), step));
+        let precision = precisions[0];
         let Some(most_bytes) = spending.most_bytes else {
             self.pressure = Pressure::default();
-            return self.encode(epoch, values, Tolerances::Even(precision.tolerance), precision.step);
+            return self.encode(epoch, store, exact);
         };
         let most = most_bytes.saturating_sub(ENVELOPE_BYTES);
         let mut best: Option<Delta> = None;
@@ -268,10 +277,16 @@ impl State {
         loop {
             let pressure = search.pressure();
             let found = if pressure.is_none() {
-                self.encode(epoch, values, Tolerances::Even(precision.tolerance), precision.step)
+                self.encode(epoch, store, exact)
             } else {
-                let (tolerances, step) = pressure.tolerances(precision, spending.coarseness, values.len());
-                self.encode(epoch, values, Tolerances::Each(&tolerances), step)
+                let points = store.layout().len();
+                let planes = precisions.iter().take(planes(store).count());
+                let by_plane: Vec<_> = planes
+                    .map(|precision| pressure.tolerances(*precision, spending.coarseness, points))
+                    .collect();
+                let of = |k: usize| by_plane.get(k).map(|(each, step)| (Tolerances::Each(each), *step));
+                let goals = std::array::from_fn(|k| of(k).unwrap_or(exact[k]));
+                self.encode(epoch, store, goals)
             };
             let bytes = found.as_ref().map_or(0, |delta| delta.payload.len());
             match found {
@@ -297,33 +312,30 @@ impl State {
     }
 
     /// The delta to values that are no farther from these than they may be; `None` where there is nothing to say.
-    fn encode(&mut self, epoch: u64, values: &[u8], tolerances: Tolerances<'_>, step: u8) -> Option<Delta> {
-        let layout = self.store.layout().clone();
-        let held = self.store.visibility();
-        let goal = Goal::new(held, values, tolerances, step)?;
-        let mut fit = self.fit;
-        let (payload, changes) = delta_payload(
-            epoch - self.epoch,
-            (&layout, &mut self.near),
-            held,
-            goal,
-            &mut fit,
-            &mut self.scratch,
-        );
-        Some(Delta { payload, changes, fit, pressure: Pressure::default() })
+    fn encode(
+        &mut self,
+        epoch: u64,
+        store: &PointStore,
+        goals: [(Tolerances<'_>, u8); PLANES],
+    ) -> Option<Delta> {
+        let goals = goals_of(&self.store, store, goals)?;
+        let mut out = Vec::new();
+        write_varint(&mut out, epoch - self.epoch);
+        let mut fits = self.fits;
+        let (payload, changes) =
+            append_changes(out, &mut self.near, &self.store, goals, &mut fits, &mut self.scratch);
+        Some(Delta { payload, changes, fits, pressure: Pressure::default() })
     }
 
     /// Goes on to the values of a delta, in the same group. Also says how many changed.
     fn advance(&mut self, epoch: u64, delta: Delta) -> (Frame, usize) {
-        let Delta { payload, changes, fit, .. } = delta;
-        let news: Vec<Change> =
-            changes.iter().map(|c| Change { point: c.point, visibility: c.new }).collect();
-        self.store.apply(&news).expect("changes are of points of the store");
-        self.fit = fit;
+        let Delta { payload, changes, fits, .. } = delta;
+        apply(&mut self.store, &changes).expect("changes are of points of the store");
+        self.fits = fits;
         self.epoch = epoch;
         self.deltas = self.deltas.saturating_add(1);
         self.snapshot = OnceLock::new();
-        (Frame::new(FrameKind::Delta, self.group, epoch, &payload), changes.len())
+        (Frame::new(FrameKind::Delta, self.group, epoch, &payload), changes.visibility.len())
     }
 
     /// Which sets lead to another layout, if it shares any with this one. What the frame would be is not weighed against a snapshot,
@@ -339,7 +351,7 @@ impl State {
         epoch: u64,
         (store, cuts): (&PointStore, Cuts),
         change: &SetsChange,
-        precision: Option<Precision>,
+        precisions: Option<[Precision; PLANES]>,
     ) -> (Frame, usize) {
         let added = PointStore::default().carried(store.layout().only(&change.added).into(), store);
         let cuts = cuts.only(&change.added);
@@ -348,18 +360,15 @@ impl State {
         self.store = self.store.carried(store.layout().clone(), &added);
         self.cuts = self.cuts.with_sets(&change.removed, &cuts);
         self.near = Near::new(store.layout(), local_bits(store.layout()));
-        let held = self.store.visibility();
-        let goal = precision.and_then(|Precision { tolerance, step }| {
-            Goal::new(held, store.visibility(), Tolerances::Even(tolerance), step)
+        let goals = precisions.and_then(|precisions| {
+            let exact = precisions.map(|Precision { tolerance, step }| (Tolerances::Even(tolerance), step));
+            goals_of(&self.store, store, exact)
         });
-        if let Some(goal) = goal {
-            let near = (&**store.layout(), &mut self.near);
-            let (bytes, changes) =
-                append_changes(payload, near, held, goal, &mut self.fit, &mut self.scratch);
-            let news: Vec<Change> =
-                changes.iter().map(|c| Change { point: c.point, visibility: c.new }).collect();
-            self.store.apply(&news).expect("changes are of points of the store");
-            (payload, changed) = (bytes, changed + changes.len());
+        if let Some(goals) = goals {
+            let State { near, store: held, fits, scratch, .. } = self;
+            let (bytes, changes) = append_changes(payload, near, held, goals, fits, scratch);
+            apply(held, &changes).expect("changes are of points of the store");
+            (payload, changed) = (bytes, changed + changes.visibility.len());
         }
         (self.encoded, self.snapshot) = (OnceLock::new(), OnceLock::new());
         self.epoch = epoch;
@@ -371,11 +380,26 @@ impl State {
 /// A delta that can be sent.
 struct Delta {
     payload: Vec<u8>,
-    changes: Vec<ValueChange>,
+    changes: Changes,
     /// What is learned from it.
-    fit: Fit,
+    fits: [Fit; PLANES],
     /// What it took to make it fit.
     pressure: Pressure,
+}
+
+/// What each plane of `held` is to be brought near to; `None` where all are near enough.
+fn goals_of<'a>(
+    held: &PointStore,
+    store: &'a PointStore,
+    how: [(Tolerances<'a>, u8); PLANES],
+) -> Option<[Option<Goal<'a>>; PLANES]> {
+    let mut goals = [const { None }; PLANES];
+    for (((goal, held), values), (tolerances, step)) in
+        goals.iter_mut().zip(planes(held)).zip(planes(store)).zip(how)
+    {
+        *goal = Goal::new(held, values, tolerances, step);
+    }
+    goals.iter().any(Option::is_some).then_some(goals)
 }
 
 impl Frame {

@@ -1,16 +1,14 @@
 //! Frames → the publisher's store.
 
-use std::sync::Arc;
-
 use dapple_store::charts::Cuts;
-use dapple_store::points::{Change, PointLayout, PointStore, StoreError};
+use dapple_store::points::{BentChange, PointStore, StoreError};
 
 use crate::codec::{
-    DecodeError, DecodedLayout, DecodedSets, DeltaParts, FrameHeader, FrameKind, Limits, Near, Scratch,
-    ValueChange, decode_changes, decode_layout, decode_sets_change, decode_values, open, parse_delta,
-    parse_snapshot,
+    Changes, DecodeError, DecodedLayout, DecodedSets, DeltaParts, FrameHeader, FrameKind, Limits, Near,
+    Scratch, ValueChange, decode_changes, decode_layout, decode_sets_change, decode_values, open,
+    parse_delta, parse_snapshot,
 };
-use crate::session::sets::{difference, value_changes};
+use crate::session::sets::{apply, changes_between, difference};
 
 /// What a frame did to the store, so that the receiver redoes only that.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -113,6 +111,8 @@ struct State {
     local_bits: u32,
     cuts: Cuts,
     store: PointStore,
+    /// Of the last frame.
+    bent_changes: Vec<BentChange>,
     near: Near,
     scratch: Scratch,
 }
@@ -126,6 +126,9 @@ impl Subscriber {
 
     /// Takes one complete frame. Any bytes are welcome; on an error the store is as it was.
     pub fn receive(&mut self, bytes: &[u8]) -> Result<Applied, ReceiveError> {
+        if let Some(state) = &mut self.state {
+            state.bent_changes.clear();
+        }
         let (header, payload) = open(bytes, &self.limits)?;
         if let Some(reason) = self.not_needed(&header) {
             return Ok(Applied::Ignored(reason));
@@ -152,6 +155,12 @@ impl Subscriber {
     /// What is held, if anything yet.
     pub fn store(&self) -> Option<&PointStore> {
         self.state.as_ref().map(|state| &state.store)
+    }
+
+    /// Which bent normals the last frame changed of points that stayed, in order of index, which is that in the store as it is now. Empty
+    /// where it changed none, as without bent normals, and where it brought another layout.
+    pub fn bent_changes(&self) -> &[BentChange] {
+        self.state.as_ref().map_or(&[], |state| &state.bent_changes)
     }
 
     /// Which points do not count at which texels, with the layout that is held. Empty where the publisher sends none.
@@ -206,26 +215,27 @@ impl Subscriber {
             && state.scene_hash == parts.scene_hash
             && state.layout_bytes == parts.layout
         {
-            let values = decode_values(parts.values, state.store.layout(), &state.near)?;
-            let store = new_store(state.store.layout().clone(), values)?;
-            let changes = value_changes(&state.store, &store, &[]);
-            state.store = store;
+            let has_bent = state.store.bent().is_some();
+            let store = decode_values(parts.values, state.store.layout().clone(), &state.near, has_bent)?;
+            let changes = changes_between(&state.store, &store, &[]);
+            (state.store, state.bent_changes) = (store, changes.bent);
             (state.group, state.epoch) = (header.group, header.epoch);
-            return Ok(Applied::Changes(changes));
+            return Ok(Applied::Changes(changes.visibility));
         }
-        let DecodedLayout { layout, cuts, local_bits } = decode_layout(parts.layout, &self.limits)?;
+        let decoded = decode_layout(parts.layout, &self.limits)?;
+        let DecodedLayout { layout, cuts, local_bits, has_bent } = decoded;
         let near = Near::new(&layout, local_bits);
-        let values = decode_values(parts.values, &layout, &near)?;
-        let mut store = new_store(layout.into(), values)?;
-        let mut applied = Applied::NewLayout;
+        let mut store = decode_values(parts.values, layout.into(), &near, has_bent)?;
+        let (mut applied, mut bent_changes) = (Applied::NewLayout, Vec::new());
         if let Some(state) = self.state.as_ref()
             && state.scene_hash == parts.scene_hash
             && let Some(change) = difference((&state.store, &state.cuts), (&store, &cuts))
         {
-            let changes = value_changes(&state.store, &store, &change.added);
+            let Changes { visibility: changes, bent } = changes_between(&state.store, &store, &change.added);
+            bent_changes = bent;
             applied = if change.is_empty() {
                 // Known again by its points: what shares the layout goes on doing so.
-                store = new_store(state.store.layout().clone(), store.visibility().to_vec())?;
+                store = PointStore::default().carried(state.store.layout().clone(), &store);
                 Applied::Changes(changes)
             } else {
                 Applied::Sets { removed: change.removed, added: change.added, changes }
@@ -239,6 +249,7 @@ impl Subscriber {
             local_bits,
             cuts,
             store,
+            bent_changes,
             near,
             scratch: Scratch::default(),
         });
@@ -248,10 +259,10 @@ impl Subscriber {
     fn receive_delta(&mut self, header: &FrameHeader, payload: &[u8]) -> Result<Applied, ReceiveError> {
         let (parts, state) = self.base(header, payload)?;
         let State { store, near, scratch, .. } = state;
-        let changes = decode_changes(&parts, store.layout(), near, store.visibility(), scratch)?;
-        apply(store, &changes)?;
-        state.epoch = header.epoch;
-        Ok(Applied::Changes(changes))
+        let changes = decode_changes(&parts, store, near, scratch)?;
+        apply(store, &changes).map_err(misfit)?;
+        (state.bent_changes, state.epoch) = (changes.bent, header.epoch);
+        Ok(Applied::Changes(changes.visibility))
     }
 
     /// What builds on an epoch of this group, and the state at that very epoch.
@@ -274,31 +285,22 @@ impl Subscriber {
     fn receive_sets(&mut self, header: &FrameHeader, payload: &[u8]) -> Result<Applied, ReceiveError> {
         let limits = self.limits;
         let (parts, state) = self.base(header, payload)?;
-        let held = (&**state.store.layout(), &state.cuts, state.local_bits);
+        let held = (&state.store, &state.cuts, state.local_bits);
         let DecodedSets { gone, added, cuts, changes } = decode_sets_change(&parts, held, &limits)?;
         let mut store = state.store.with_sets(&gone, &added).map_err(DecodeError::from)?;
         let mut near = Near::new(store.layout(), state.local_bits);
         if let Some(parts) = &changes {
             let scratch = &mut state.scratch;
-            let changes = decode_changes(parts, store.layout(), &mut near, store.visibility(), scratch)?;
-            apply(&mut store, &changes)?;
+            let changes = decode_changes(parts, &store, &mut near, scratch)?;
+            apply(&mut store, &changes).map_err(misfit)?;
         }
         let added: Vec<u32> = added.layout().sets().iter().map(|set| set.instance).collect();
-        let changes = value_changes(&state.store, &store, &added);
+        let Changes { visibility: changes, bent } = changes_between(&state.store, &store, &added);
         state.cuts = state.cuts.with_sets(&gone, &cuts);
-        state.layout_bytes = Vec::new();
+        (state.layout_bytes, state.bent_changes) = (Vec::new(), bent);
         (state.store, state.near, state.epoch) = (store, near, header.epoch);
         Ok(Applied::Sets { removed: gone, added, changes })
     }
-}
-
-fn apply(store: &mut PointStore, changes: &[ValueChange]) -> Result<(), DecodeError> {
-    let news: Vec<Change> = changes.iter().map(|c| Change { point: c.point, visibility: c.new }).collect();
-    store.apply(&news).map_err(misfit)
-}
-
-fn new_store(layout: Arc<PointLayout>, values: Vec<u8>) -> Result<PointStore, DecodeError> {
-    PointStore::new(layout, values).map_err(misfit)
 }
 
 /// The decoder has checked counts and indices already; should the store see more, the sender is at fault.

@@ -41,10 +41,13 @@ prop_compose! {
     }
 }
 
-/// Stores over random layouts.
+/// Stores over random layouts, with or without bent normals.
 pub(crate) fn stores() -> impl Strategy<Value = PointStore> {
     layouts().prop_flat_map(|layout| {
-        prop::collection::vec(any::<u8>(), layout.len())
-            .prop_map(move |values| PointStore::new(layout.clone(), values).expect("one value a point"))
+        let plane = || prop::collection::vec(any::<u8>(), layout.len());
+        (plane(), prop::option::of([plane(), plane()])).prop_map(move |(values, bent)| {
+            let store = PointStore::new(layout.clone(), values).expect("one value a point");
+            bent.map_or(store.clone(), |bent| store.with_bent(bent).expect("one a point"))
+        })
     })
 }

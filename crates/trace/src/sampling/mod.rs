@@ -6,6 +6,7 @@
 //! \[Burley2020\]: B. Burley, "Practical Hash-based Owen Scrambling", JCGT 9 (4), 2020.
 
 use dapple_scene::glam::Vec3;
+pub use dapple_store::points::orthonormal_basis;
 
 /// A well mixed 32-bit hash of a seed, a site and a sample: every bit of the result depends on every bit of all three.
 pub fn hash(seed: u64, site: u64, sample: u32) -> u32 {
@@ -50,18 +51,6 @@ fn sin_cos_turns(turns: f32) -> (f32, f32) {
         2 => (-sin, -cos),
         _ => (-cos, sin),
     }
-}
-
-/// Unit tangent and bitangent of a unit normal, so that `(tangent, bitangent, normal)` is right-handed.
-///
-/// Branchless \[Duff2017\] ("Building an Orthonormal Basis, Revisited", JCGT 6 (1), 2017); jumps only across the plane
-/// z = 0.
-pub fn orthonormal_basis(normal: Vec3) -> (Vec3, Vec3) {
-    let sign = 1.0_f32.copysign(normal.z);
-    let a = -1.0 / (sign + normal.z);
-    let b = normal.x * normal.y * a;
-    let tangent = Vec3::new(1.0 + sign * normal.x * normal.x * a, sign * b, -sign * normal.x);
-    (tangent, Vec3::new(b, sign + normal.y * normal.y * a, -normal.y))
 }
 
 /// The first `rays` directions (cosine density around +Z) of the site with that hash: fixed for ever for a site.

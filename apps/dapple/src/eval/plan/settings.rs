@@ -28,6 +28,9 @@ pub(in crate::eval) struct Settings {
     pub(in crate::eval) threshold: u8,
     pub(in crate::eval) seed: u32,
     pub(in crate::eval) adaptive: f32,
+    pub(in crate::eval) bent_normals: bool,
+    /// Whether ambient light in the truth's pictures comes from the directions that are open.
+    pub(in crate::eval) gather_ambient: bool,
     pub(in crate::eval) step: StepArgs,
     pub(in crate::eval) hdr_flip: bool,
 }
@@ -63,6 +66,8 @@ impl Settings {
             threshold: options.threshold.unwrap_or(4),
             seed: options.seed.unwrap_or(1),
             adaptive: options.adaptive.unwrap_or(0.0),
+            bent_normals: options.bent_normals.unwrap_or(false),
+            gather_ambient: options.gather_ambient.unwrap_or(false) || options.bent_normals.unwrap_or(false),
             step: StepArgs {
                 ray_budget: options.ray_budget,
                 rays_still: options.rays_still.unwrap_or(0),

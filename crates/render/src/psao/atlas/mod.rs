@@ -3,6 +3,7 @@
 //! Takes a layout, a scene, the values of the points and their changes; gives texels `[old, new]` in layers, which a
 //! fragment reads once, bilinearly. See `README.md`.
 
+mod bent;
 mod job;
 mod pages;
 mod resolve;
@@ -22,6 +23,7 @@ pub use dapple_store::charts::Placement;
 pub use pages::{DirtyBand, MAX_LAYERS};
 pub use upload::TexelInfo;
 
+use bent::BentSums;
 use job::{ENCODED_A_TEXEL, Job, SUMMED_A_TEXEL, Stage, VISITS_A_TEXEL};
 use pages::{Pages, PlacedPages};
 use resolve::{PointTexels, Sums};
@@ -132,6 +134,8 @@ struct ReadySet {
     charts_key: InstanceKey,
     table: PointTexels,
     sums: Sums,
+    /// Once they are taken in.
+    bent: Option<BentSums>,
     /// Of the front's pages, then, if it is seen from both sides, of the back's.
     placements: Vec<Placement>,
     placed: PlacedPages,

@@ -1,5 +1,6 @@
 //! Exactness and truth of the atlas.
 
+mod bent;
 mod sets;
 
 use dapple_scene::{AlphaMode, Material};

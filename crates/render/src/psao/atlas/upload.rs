@@ -93,7 +93,8 @@ impl VisibilityAtlas {
         let mut charts = BTreeMap::new();
         for state in &self.sets {
             let SetState::Ready(ready) = state else { continue };
-            bytes += (ready.table.bytes() + ready.sums.bytes()) as u64;
+            let bent = ready.bent.as_ref().map_or(0, |bent| bent.bytes());
+            bytes += (ready.table.bytes() + ready.sums.bytes() + bent) as u64;
             charts.insert(Arc::as_ptr(&ready.charts), ready.charts.memory_bytes());
         }
         bytes + charts.values().sum::<u64>() + self.job.as_ref().map_or(0, |job| job.memory_bytes())

@@ -78,3 +78,23 @@ pub(crate) fn pose_anchor(anchor: &Anchor, corners: [Vec3; 3], mirrored: bool) -
     let normal = if mirrored != anchor.is_back() { -face } else { face };
     Some(PosedPoint { position: a + ab * u + ac * v, normal, tangent })
 }
+
+/// Where the axes that a posed anchor's frame has in the world (tangent, normal × tangent, normal) lie at rest, if the surface is
+/// carried along without turning in itself; `mirrored` as for [`pose_anchor`], of the pose. `None` where the triangle at rest has no
+/// normal.
+pub(crate) fn rest_axes(
+    anchor: &Anchor,
+    scene: &Scene,
+    instance: usize,
+    mirrored: bool,
+) -> Option<[Vec3; 3]> {
+    let placed = &scene.instances[instance];
+    let mesh = &scene.meshes[placed.mesh as usize];
+    let corners = mesh.triangles[anchor.triangle() as usize]
+        .map(|v| placed.rest_from_mesh * mesh.positions[v as usize]);
+    let mirrored_at_rest = placed.rest_from_mesh.determinant() < 0.0;
+    let PosedPoint { normal, tangent, .. } = pose_anchor(anchor, corners, mirrored_at_rest)?;
+    // Into the triangle and to the same side of it: where one of both is mirrored, the third axis runs the other way.
+    let bitangent = normal.cross(tangent);
+    Some([tangent, if mirrored == mirrored_at_rest { bitangent } else { -bitangent }, normal])
+}

@@ -19,7 +19,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 pub use anchor::Anchor;
-pub(crate) use anchor::{PosedPoint, pose_anchor};
+pub(crate) use anchor::{PosedPoint, pose_anchor, rest_axes};
 use density::{Field, MOST_DENSE, Pilots};
 use eliminate::{Candidate, eliminate, maximum_radius};
 pub use layer::PointLayer;

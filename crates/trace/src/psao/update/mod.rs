@@ -3,6 +3,7 @@
 //! Takes the scene's pose and a tracer brought up to it; returns the [`Change`](dapple_store::points::Change)s.
 //! A step has two halves: [`Updater::select`] finds and ranks, [`Updater::trace_selected`] traces.
 
+mod bent;
 mod clusters;
 mod interest;
 mod motion;
@@ -14,6 +15,8 @@ mod trace;
 
 #[cfg(test)]
 mod tests;
+
+use std::sync::Arc;
 
 use dapple_scene::{Aabb, Pose, Scene};
 use dapple_store::points::{PointLayout, PointStore};
@@ -28,7 +31,7 @@ use motion::Motion;
 use patterns::Patterns;
 pub use report::{StepCounts, StepInput, UpdateReport};
 use spawn::Spawn;
-use trace::{Context, Scratch, Traced};
+use trace::{Context, PointLight, Scratch, Traced};
 
 /// Most rays of a point at rest.
 const MAX_RAYS_STILL: u32 = 1024;
@@ -44,11 +47,13 @@ pub struct UpdateParams {
     pub rays_still: u32,
     /// Occlusion distance in metres, > 0. Default 0.6 ([Neff2023] sec. 4).
     pub radius_m: f32,
+    /// Whether points get bent normals, from the same `rays` rays: the mean direction of those that are open. Default false.
+    pub bent_normals: bool,
 }
 
 impl Default for UpdateParams {
     fn default() -> Self {
-        UpdateParams { rays: 64, rays_still: 0, radius_m: 0.6 }
+        UpdateParams { rays: 64, rays_still: 0, radius_m: 0.6, bent_normals: false }
     }
 }
 
@@ -148,9 +153,8 @@ impl Updater {
             restless: params.refines(),
             counts: StepCounts::default(),
         };
-        let visibility = updater.trace_all(scene, pose, tracer, params.rays, progress);
-        updater.store = PointStore::new(updater.store.layout().clone(), visibility)
-            .expect("one value was traced for each point");
+        let light = updater.trace_all(scene, pose, tracer, params.rays, progress);
+        updater.store = store_of(updater.store.layout().clone(), &light, params.bent_normals);
         Ok(updater)
     }
 
@@ -185,7 +189,7 @@ impl Updater {
         let layout = layout_bytes(self.store.layout());
         let bytes = size_of::<Updater>()
             + layout
-            + self.store.visibility().len()
+            + self.store.value_bytes()
             + self.anchors.capacity() * size_of::<Anchor>()
             + self.clusters.iter().map(Cluster::bytes).sum::<usize>()
             + (self.clusters.capacity() - self.clusters.len()) * size_of::<Cluster>()
@@ -221,7 +225,7 @@ impl Updater {
             patterns: &self.patterns,
             params: &self.params,
             movers: self.motion.casting_movers(scene),
-            known: self.store.visibility(),
+            known: &self.store,
         };
         let traced: Vec<Traced> = self
             .clusters
@@ -230,10 +234,13 @@ impl Updater {
             .map(|cluster| cluster.trace(&context))
             .collect();
         let mut report = UpdateReport { changes: Vec::new(), counts: std::mem::take(&mut self.counts) };
+        let mut bent_changes = Vec::new();
         for traced in traced {
             report.counts.add(&traced.counts);
             report.changes.extend(traced.changes);
+            bent_changes.extend(traced.bent_changes);
         }
+        self.store.apply_bent(&bent_changes).expect("bent normals are traced of points that have some");
         self.store.apply(&report.changes).expect("every traced point is a point of the store");
         self.trace_spawned(scene, pose, tracer, &mut report.counts);
         report
@@ -249,13 +256,14 @@ impl Updater {
         }
         self.restless = self.params.refines();
         let rays = self.params.rays.max(self.params.rays_still);
-        let values = self.trace_all(scene, pose, tracer, rays, &|_| ());
-        let known = self.store.visibility().iter().zip(values);
+        let light = self.trace_all(scene, pose, tracer, rays, &|_| ());
+        let store = store_of(self.store.layout().clone(), &light, self.params.bent_normals);
+        let known = self.store.visibility().iter().zip(store.visibility().iter().copied());
         let changed = (0..).zip(known).filter(|(_, (a, b))| *a != b);
         let changes: Vec<_> = changed
             .map(|(point, (_, visibility))| dapple_store::points::Change { point, visibility })
             .collect();
-        self.store.apply(&changes).expect("every traced point is a point of the store");
+        self.store = store;
         let points = self.anchors.len() as u32;
         let counts = StepCounts {
             selected: points,
@@ -266,7 +274,7 @@ impl Updater {
         UpdateReport { changes, counts }
     }
 
-    /// Visibility of every point, nothing remembered.
+    /// The light of every point, nothing remembered.
     fn trace_all(
         &self,
         scene: &Scene,
@@ -274,8 +282,8 @@ impl Updater {
         tracer: &Tracer,
         rays: u32,
         progress: &(dyn Fn(usize) + Sync),
-    ) -> Vec<u8> {
-        let (anchors, params, known) = (&self.anchors[..], &self.params, self.store.visibility());
+    ) -> Vec<PointLight> {
+        let (anchors, params, known) = (&self.anchors[..], &self.params, &self.store);
         let (patterns, movers) = (&self.patterns, Vec::new());
         let context = Context { scene, pose, tracer, anchors, patterns, params, movers, known };
         let done = std::sync::atomic::AtomicUsize::new(0);
@@ -286,8 +294,10 @@ impl Updater {
                 let mut values = Vec::new();
                 for cluster in chunk {
                     let anchors = &anchors[cluster.range()];
-                    let traced =
-                        anchors.iter().map(|a| context.visibility(a, cluster.instance, rays, &mut scratch));
+                    let normals = context.normals(cluster.instance, cluster.first);
+                    let traced = anchors.iter().zip(normals).map(|(anchor, normal)| {
+                        context.light(anchor, (cluster.instance, *normal), rays, &mut scratch)
+                    });
                     values.extend(traced);
                 }
                 let before = done.fetch_add(values.len(), std::sync::atomic::Ordering::Relaxed);
@@ -296,6 +306,17 @@ impl Updater {
             })
             .collect()
     }
+}
+
+/// A store of what was traced.
+fn store_of(layout: Arc<PointLayout>, light: &[PointLight], has_bent: bool) -> PointStore {
+    let visibility = light.iter().map(|light| light.visibility).collect();
+    let store = PointStore::new(layout, visibility).expect("one value was traced for each point");
+    if !has_bent {
+        return store;
+    }
+    let plane = |k: usize| light.iter().map(|light| light.bent.0[k]).collect();
+    store.with_bent([plane(0), plane(1)]).expect("one bent normal was traced for each point")
 }
 
 /// Bytes of a layout's points, by capacity.

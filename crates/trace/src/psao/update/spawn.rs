@@ -9,17 +9,16 @@ use rayon::prelude::*;
 
 use super::clusters::{Cluster, bits};
 use super::motion::Observed;
-use super::trace::{Context, Scratch};
-use super::{StepCounts, Updater, layout_bytes};
+use super::trace::{Context, NEUTRAL, PointLight, Scratch};
+use super::{StepCounts, Updater, layout_bytes, store_of};
 use crate::Tracer;
 use crate::psao::generate::{Anchor, GeneratedPoints};
 
 /// The points of one instance between laying and the first ray of the last of them.
 #[derive(Clone, Debug)]
 pub(super) struct Spawn {
-    layout: Arc<PointLayout>,
+    store: PointStore,
     anchors: Vec<Anchor>,
-    values: Vec<u8>,
     /// In which the points are counted from 0.
     clusters: Vec<Cluster>,
     /// Parallel to the clusters: points that no ray has left yet.
@@ -27,15 +26,19 @@ pub(super) struct Spawn {
 }
 
 impl Spawn {
-    fn new(layout: PointLayout, anchors: Vec<Anchor>) -> Spawn {
+    fn new(layout: PointLayout, anchors: Vec<Anchor>, has_bent: bool) -> Spawn {
         let clusters = Cluster::all(&layout);
+        let neutral = vec![NEUTRAL; layout.len()];
         Spawn {
-            values: vec![255; layout.len()],
             untraced: clusters.iter().map(Cluster::everything).collect(),
-            layout: Arc::new(layout),
+            store: store_of(Arc::new(layout), &neutral, has_bent),
             anchors,
             clusters,
         }
+    }
+
+    fn layout(&self) -> &PointLayout {
+        self.store.layout()
     }
 
     fn is_complete(&self) -> bool {
@@ -43,7 +46,7 @@ impl Spawn {
     }
 
     fn has(&self, instance: u32) -> bool {
-        self.layout.set_of_instance(instance).is_some()
+        self.layout().set_of_instance(instance).is_some()
     }
 
     /// Marks what motion may have changed of the points that are traced already.
@@ -57,9 +60,9 @@ impl Spawn {
     }
 
     pub(super) fn bytes(&self) -> usize {
-        layout_bytes(&self.layout)
+        layout_bytes(self.layout())
             + self.anchors.capacity() * size_of::<Anchor>()
-            + self.values.capacity()
+            + self.store.value_bytes()
             + self.clusters.iter().map(Cluster::bytes).sum::<usize>()
             + self.untraced.capacity() * size_of::<u64>()
     }
@@ -87,7 +90,7 @@ impl Updater {
         for set in layout.sets() {
             let first = set.first as usize;
             let anchors = anchors[first..first + set.len()].to_vec();
-            self.spawns.push(Spawn::new(layout.only(&[set.instance]), anchors));
+            self.spawns.push(Spawn::new(layout.only(&[set.instance]), anchors, self.params.bent_normals));
         }
         self.restless |= !self.spawns.is_empty();
         Ok(())
@@ -112,7 +115,7 @@ impl Updater {
         self.spawns = waiting;
         let ready: Vec<Spawn> = ready;
         let mut instances: Vec<u32> =
-            ready.iter().flat_map(|spawn| spawn.layout.sets()).map(|set| set.instance).collect();
+            ready.iter().flat_map(|spawn| spawn.layout().sets()).map(|set| set.instance).collect();
         instances.sort_unstable();
         if !ready.is_empty() {
             self.change_sets(&[], ready);
@@ -122,15 +125,15 @@ impl Updater {
 
     /// Points that have been laid and do not count yet.
     pub fn spawning(&self) -> usize {
-        self.spawns.iter().map(|spawn| spawn.layout.len()).sum()
+        self.spawns.iter().map(|spawn| spawn.layout().len()).sum()
     }
 
     fn change_sets(&mut self, gone: &[u32], ready: Vec<Spawn>) {
         let before = self.store.layout().clone();
-        let mut sets: Vec<_> = ready.iter().flat_map(|spawn| spawn.layout.sets()).cloned().collect();
+        let mut sets: Vec<_> = ready.iter().flat_map(|spawn| spawn.layout().sets()).cloned().collect();
         sets.sort_unstable_by_key(|set| set.instance);
         let came = PointLayout::new(before.quantum_m(), before.spacing_m(), sets).expect("they were laid so");
-        let mut values = vec![0; came.len()];
+        let mut light = vec![NEUTRAL; came.len()];
         let mut anchors_of: BTreeMap<u32, &[Anchor]> = BTreeMap::new();
         let mut clusters_of: BTreeMap<u32, Vec<Cluster>> = BTreeMap::new();
         for set in before.sets() {
@@ -141,14 +144,16 @@ impl Updater {
             clusters_of.entry(cluster.instance).or_default().push(cluster);
         }
         for spawn in &ready {
-            for set in spawn.layout.sets() {
+            for set in spawn.layout().sets() {
                 let to = came.set_of_instance(set.instance).map_or(0, |set| set.first as usize);
-                values[to..to + set.len()].copy_from_slice(&spawn.values);
+                for (point, light) in light[to..to + set.len()].iter_mut().enumerate() {
+                    *light = PointLight::of(&spawn.store, point);
+                }
                 anchors_of.insert(set.instance, &spawn.anchors);
                 clusters_of.insert(set.instance, spawn.clusters.clone());
             }
         }
-        let came = PointStore::new(came.into(), values).expect("each point has its value");
+        let came = store_of(came.into(), &light, self.params.bent_normals);
         let store = self.store.with_sets(gone, &came).expect("it was asked for what fits");
         let mut anchors = Vec::with_capacity(store.layout().len());
         let mut clusters = Vec::with_capacity(clusters_of.values().map(Vec::len).sum());
@@ -196,16 +201,17 @@ impl Updater {
     ) {
         let (patterns, params) = (&self.patterns, &self.params);
         for spawn in &mut self.spawns {
-            let Spawn { anchors, values, clusters, untraced, .. } = spawn;
-            let (anchors, known) = (&anchors[..], &[][..]);
+            let Spawn { store, anchors, clusters, untraced } = spawn;
+            let (anchors, known) = (&anchors[..], &*store);
             let context =
                 Context { scene, pose, tracer, anchors, patterns, params, movers: Vec::new(), known };
-            let traced: Vec<Vec<u8>> = clusters
+            let traced: Vec<Vec<PointLight>> = clusters
                 .par_iter()
                 .map_init(Scratch::default, |scratch, cluster| {
-                    let trace = |bit| {
+                    let normals = context.normals(cluster.instance, cluster.first);
+                    let trace = |bit: usize| {
                         let anchor = &anchors[cluster.first as usize + bit];
-                        context.visibility(anchor, cluster.instance, params.rays, scratch)
+                        context.light(anchor, (cluster.instance, normals[bit]), params.rays, scratch)
                     };
                     bits(cluster.selected).map(trace).collect()
                 })
@@ -213,8 +219,8 @@ impl Updater {
             for ((cluster, untraced), traced) in clusters.iter_mut().zip(untraced).zip(traced) {
                 counts.traced_full += traced.len() as u32;
                 counts.rays_full += traced.len() as u64 * u64::from(params.rays);
-                for (bit, value) in bits(cluster.selected).zip(traced) {
-                    values[cluster.first as usize + bit] = value;
+                for (bit, light) in bits(cluster.selected).zip(traced) {
+                    light.put(store, cluster.first + bit as u32);
                 }
                 *untraced &= !cluster.selected;
                 cluster.selected = 0;

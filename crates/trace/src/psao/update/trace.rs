@@ -1,7 +1,7 @@
 //! Rays of the chosen points: against everything, against movers alone, or more of them.
 
 use dapple_scene::{Pose, Scene};
-use dapple_store::points::Change;
+use dapple_store::points::{BentChange, BentNormal, Change, PackedNormal, PointStore};
 use glam::Vec3;
 
 use super::clusters::{Cluster, Memory, bits};
@@ -21,13 +21,43 @@ pub(super) struct Context<'a> {
     pub(super) params: &'a UpdateParams,
     /// Where casting movers are.
     pub(super) movers: Vec<Near>,
-    pub(super) known: &'a [u8],
+    /// What is known of the points.
+    pub(super) known: &'a PointStore,
+}
+
+/// What is traced of a point.
+#[derive(Clone, Copy)]
+pub(super) struct PointLight {
+    /// 255 = open.
+    pub(super) visibility: u8,
+    /// Unbent if nobody wants it.
+    pub(super) bent: BentNormal,
+}
+
+impl PointLight {
+    /// What a store has of a point.
+    pub(super) fn of(store: &PointStore, point: usize) -> PointLight {
+        PointLight {
+            visibility: store.visibility()[point],
+            bent: store.bent_of(point).unwrap_or(BentNormal::UNBENT),
+        }
+    }
+
+    /// Puts it into a store, with what that has room for.
+    pub(super) fn put(self, store: &mut PointStore, point: u32) {
+        let PointLight { visibility, bent: new } = self;
+        store.apply(&[Change { point, visibility }]).expect("it is a point of the store");
+        if let Some(old) = store.bent_of(point as usize) {
+            store.apply_bent(&[BentChange { point, old, new }]).expect("it is a point of the store");
+        }
+    }
 }
 
 /// What became of one cluster's points.
 #[derive(Default)]
 pub(super) struct Traced {
     pub(super) changes: Vec<Change>,
+    pub(super) bent_changes: Vec<BentChange>,
     pub(super) counts: StepCounts,
 }
 
@@ -48,7 +78,7 @@ pub(super) struct Scratch {
 }
 
 /// A collapsed triangle shows nothing; open is the neutral value.
-const NEUTRAL: u8 = 255;
+pub(super) const NEUTRAL: PointLight = PointLight { visibility: 255, bent: BentNormal::UNBENT };
 
 const ALL: BlockedMask = [u64::MAX; MAX_DIRECTIONS / 64];
 
@@ -94,6 +124,14 @@ impl<'a> Surface<'a> {
         (ask != BlockedMask::default()).then_some(ask)
     }
 
+    /// The bent normal, if it is wanted, with the point's first directions `blocked` like this.
+    fn bent(&self, anchor: &Anchor, of: (u32, PackedNormal), blocked: &BlockedMask) -> BentNormal {
+        match self.context.params.bent_normals {
+            true => self.context.bent_normal(anchor, of, blocked, self.context.patterns.of(self.site)),
+            false => BentNormal::UNBENT,
+        }
+    }
+
     /// How many of some of the point's directions are open.
     fn count_open(&self, blockers: Blockers, indices: std::ops::Range<u32>, scratch: &mut Scratch) -> u32 {
         let Scratch { local, world, .. } = scratch;
@@ -132,14 +170,32 @@ impl<'a> Surface<'a> {
 }
 
 impl Context<'_> {
-    /// Visibility from `rays` rays against everything.
-    pub(super) fn visibility(&self, anchor: &Anchor, instance: u32, rays: u32, scratch: &mut Scratch) -> u8 {
-        let Some(surface) = Surface::new(self, anchor, instance) else { return NEUTRAL };
-        if rays == self.params.rays {
-            let blocked = surface.blocked(Blockers::All, &ALL, scratch);
-            return quantize(rays - count_blocked(&blocked), rays);
+    /// A point's light from `rays` rays against everything; its bent normal is always that of the first ones.
+    pub(super) fn light(
+        &self,
+        anchor: &Anchor,
+        of: (u32, PackedNormal),
+        rays: u32,
+        scratch: &mut Scratch,
+    ) -> PointLight {
+        let Some(surface) = Surface::new(self, anchor, of.0) else { return NEUTRAL };
+        let first = self.params.rays;
+        if rays != first && !self.params.bent_normals {
+            let open = surface.count_open(Blockers::All, 0..rays, scratch);
+            return PointLight { visibility: quantize(open, rays), bent: BentNormal::UNBENT };
         }
-        quantize(surface.count_open(Blockers::All, 0..rays, scratch), rays)
+        let blocked = surface.blocked(Blockers::All, &ALL, scratch);
+        let mut open = first - count_blocked(&blocked);
+        if rays > first {
+            open += surface.count_open(Blockers::All, first..rays, scratch);
+        }
+        PointLight { visibility: quantize(open, rays), bent: surface.bent(anchor, of, &blocked) }
+    }
+
+    /// The packed normals of points from `first` on, which are of an instance.
+    pub(super) fn normals(&self, instance: u32, first: u32) -> &[PackedNormal] {
+        let set = self.known.layout().set_of_instance(instance);
+        set.map_or(&[], |set| &set.normals[(first - set.first) as usize..])
     }
 }
 
@@ -151,10 +207,12 @@ impl Cluster {
         if self.selected != 0 {
             self.last_change = 0;
             if self.moving {
+                let normals = context.normals(self.instance, self.first);
                 for bit in bits(self.selected) {
                     let anchor = &context.anchors[self.first as usize + bit];
-                    let value = context.visibility(anchor, self.instance, context.params.rays, &mut scratch);
-                    self.report(context, bit, value, &mut traced);
+                    let of = (self.instance, normals[bit]);
+                    let light = context.light(anchor, of, context.params.rays, &mut scratch);
+                    self.report(context, bit, light, &mut traced);
                     traced.counts.traced_full += 1;
                     traced.counts.rays_full += u64::from(context.params.rays);
                 }
@@ -177,6 +235,7 @@ impl Cluster {
         let rays = context.params.rays;
         let bounds = *self.bounds_world();
         let movers: Vec<&Near> = context.movers.iter().filter(|near| near.touches(&bounds)).collect();
+        let normals = context.normals(self.instance, self.first);
         let Some(mut memory) = self.memory.take() else { return };
         memory.make_room(context.params.mask_words(), context.params.refines());
         for bit in bits(self.selected) {
@@ -191,12 +250,16 @@ impl Cluster {
             }
             let still = memory.mask(bit, context.params);
             let open = rays - count_blocked(&still);
-            let left = match surface.towards(&movers, &still, scratch) {
-                Some(ask) => open - count_blocked(&surface.blocked(Blockers::Movers, &ask, scratch)),
-                None => open,
-            };
+            let (mut blocked, mut left) = (still, open);
+            if let Some(ask) = surface.towards(&movers, &still, scratch) {
+                let by_movers = surface.blocked(Blockers::Movers, &ask, scratch);
+                left -= count_blocked(&by_movers);
+                blocked.iter_mut().zip(by_movers).for_each(|(all, movers)| *all |= movers);
+            }
             let [rays_still, open_still] = memory.refined_of(bit, [rays, open]);
-            self.report(context, bit, estimate(open_still, rays_still, left, open), traced);
+            let visibility = estimate(open_still, rays_still, left, open);
+            let bent = surface.bent(anchor, (self.instance, normals[bit]), &blocked);
+            self.report(context, bit, PointLight { visibility, bent }, traced);
             if known {
                 traced.counts.traced_movers += 1;
                 traced.counts.rays_movers += u64::from(open);
@@ -225,16 +288,25 @@ impl Cluster {
             let open = open + surface.count_open(Blockers::Still, before..after, scratch);
             memory.refined[bit] = [after as u16, open as u16];
             memory.settled |= u64::from(after == rays_still) << bit;
-            self.report(context, bit, quantize(open, after), traced);
+            // More rays say more of how much is open, not of where: those are counted and forgotten.
+            self.report_visibility(context, bit, quantize(open, after), traced);
             traced.counts.refined += 1;
             traced.counts.rays_refined += u64::from(after - before);
         }
         self.memory = Some(memory);
     }
 
-    fn report(&mut self, context: &Context<'_>, bit: usize, visibility: u8, traced: &mut Traced) {
+    fn report(&mut self, context: &Context<'_>, bit: usize, light: PointLight, traced: &mut Traced) {
+        self.report_visibility(context, bit, light.visibility, traced);
         let point = self.first + bit as u32;
-        let difference = visibility.abs_diff(context.known[point as usize]);
+        if let Some(old) = context.known.bent_of(point as usize).filter(|old| *old != light.bent) {
+            traced.bent_changes.push(BentChange { point, old, new: light.bent });
+        }
+    }
+
+    fn report_visibility(&mut self, context: &Context<'_>, bit: usize, visibility: u8, traced: &mut Traced) {
+        let point = self.first + bit as u32;
+        let difference = visibility.abs_diff(context.known.visibility()[point as usize]);
         self.last_change = self.last_change.max(difference);
         if difference > 0 {
             traced.changes.push(Change { point, visibility });

@@ -29,7 +29,7 @@ proptest! {
         x in 1f32..3.0,
     ) {
         let (scene, mut pose) = crowd(seed);
-        let params = UpdateParams { rays: 40, rays_still, radius_m: 0.5 };
+        let params = UpdateParams { rays: 40, rays_still, radius_m: 0.5, bent_normals: true };
         let (mut tracer, mut updater) = start_at(&scene, &pose, params, 40.0);
         let interest = halves(x);
         let input = StepInput { ray_budget: Some(rays), interest: &interest[..1] };

@@ -19,9 +19,10 @@ proptest! {
         seed in 0u32..1000,
         script in any_script(),
         rays in prop_oneof![Just(24u32), Just(64), Just(100)],
+        bent_normals: bool,
     ) {
         let (scene, mut pose) = crowd(seed);
-        let params = UpdateParams { rays, radius_m: 0.5, ..Default::default() };
+        let params = UpdateParams { rays, radius_m: 0.5, bent_normals, ..Default::default() };
         let (mut tracer, mut updater) = start_at(&scene, &pose, params, 40.0);
         let mut everything = updater.clone();
         for (moves, rest) in script {

@@ -1,5 +1,6 @@
 //! Selective tracing must give what full tracing gives, now or in time.
 
+mod bent;
 mod budget;
 mod exact;
 mod memory;

@@ -4,7 +4,7 @@ use super::*;
 use crate::psao::update::trace::estimate;
 
 fn refined() -> UpdateParams {
-    UpdateParams { rays: 64, rays_still: 256, radius_m: 0.5 }
+    UpdateParams { rays: 64, rays_still: 256, radius_m: 0.5, ..Default::default() }
 }
 
 fn put(scene: &Scene, pose: &mut Pose, tracer: &mut Tracer, place: Vec3) {

@@ -52,7 +52,7 @@ proptest! {
         rays_still in prop_oneof![Just(0u32), Just(64)],
     ) {
         let (scene, mut there) = crowd(seed);
-        let params = UpdateParams { rays: 24, rays_still, radius_m: 0.5 };
+        let params = UpdateParams { rays: 24, rays_still, radius_m: 0.5, bent_normals: true };
         let (mut tracer, mut updater) = start_at(&scene, &there, params, 40.0);
         let mut everything = updater.clone();
         let mut gone = [false; 8];

@@ -65,7 +65,7 @@ proptest! {
         let (scene, mut pose) = crowd(9);
         let (layer, sets) = laid(&scene, &pose);
         let mut tracer = Tracer::new(&scene, &pose);
-        let params = UpdateParams { rays: 32, ..Default::default() };
+        let params = UpdateParams { rays: 32, bent_normals: true, ..Default::default() };
         let mut updater =
             Updater::new(&scene, &pose, &tracer, layer.empty().unwrap(), params, &|_| ()).unwrap();
         let mut wanted = std::collections::BTreeSet::new();
@@ -106,6 +106,7 @@ proptest! {
         let before = updater.store().clone();
         let again = updater.step_all(&scene, &pose, &Tracer::new(&scene, &pose));
         prop_assert!(again.changes.is_empty(), "{} of {} points", again.changes.len(), before.layout().len());
+        prop_assert_eq!(updater.store(), &before);
     }
 }
 
