@@ -20,7 +20,10 @@ pub struct Arrivals {
     consumer: origin::Consumer,
     announced: announce::Consumer,
     names: Names,
+    /// Who is announced, heard or not.
     here: BTreeSet<String>,
+    /// Each that is heard holds one of these.
+    places: Arc<()>,
     most: usize,
 }
 
@@ -30,10 +33,11 @@ impl Arrivals {
     /// # Errors
     /// The origin does not allow it.
     pub fn new(origin: &origin::Producer, names: &Names, most: usize) -> Result<Arrivals, LinkError> {
-        let consumer = origin.consume().scope("", &names.writable()?)?;
+        let consumer = origin.consume().scope("", &names.rights("*")?.1)?;
         let announced = consumer.announced();
-        let (origin, names, here) = (origin.clone(), names.clone(), BTreeSet::new());
-        Ok(Arrivals { origin, consumer, announced, names, here, most })
+        let (origin, names) = (origin.clone(), names.clone());
+        let (here, places) = (BTreeSet::new(), Arc::new(()));
+        Ok(Arrivals { origin, consumer, announced, names, here, places, most })
     }
 
     /// The next viewer: where to say something to it, and what it says. `None` once the origin has ended.
@@ -47,11 +51,15 @@ impl Arrivals {
                 continue;
             }
             let is_one = is_viewer(&name) && path == self.names.from_viewer(&name);
-            if !is_one || self.here.len() >= self.most || !self.here.insert(name.clone()) {
+            if !is_one || self.here.len() >= 4 * self.most || !self.here.insert(name.clone()) {
+                continue;
+            }
+            if Arc::strong_count(&self.places) > self.most {
+                tracing::debug!("more than {} want to be heard", self.most);
                 continue;
             }
             match HostOut::new(&self.origin, &self.names.to_viewer(&name)) {
-                Ok(out) => return Some((out, HostIn::new(self.consumer.clone(), path))),
+                Ok(out) => return Some((out, HostIn::new(self.consumer.clone(), path, self.places.clone()))),
                 Err(error) => tracing::debug!("a viewer cannot be answered: {error}"),
             }
         }
@@ -94,11 +102,14 @@ impl Drop for HostOut {
 }
 
 /// What one viewer says.
-pub struct HostIn(Pump);
+pub struct HostIn {
+    pump: Pump,
+    _place: Arc<()>,
+}
 
 impl HostIn {
-    fn new(consumer: origin::Consumer, path: String) -> HostIn {
-        HostIn(Pump::new(move |messages| {
+    fn new(consumer: origin::Consumer, path: String, place: Arc<()>) -> HostIn {
+        let pump = Pump::new(move |messages| {
             Box::pin(async move {
                 let broadcast = consumer.request_broadcast(path.as_str()).await?;
                 // A hello must be heard, whenever it was said.
@@ -111,7 +122,8 @@ impl HostIn {
                     Either::Left((ended, _)) | Either::Right((ended, _)) => ended,
                 }
             })
-        }))
+        });
+        HostIn { pump, _place: place }
     }
 
     /// The next message; `None` once it has gone.
@@ -119,7 +131,7 @@ impl HostIn {
     /// # Errors
     /// It broke a rule, or its connection broke.
     pub async fn receive(&mut self) -> Result<Option<Message>, LinkError> {
-        self.0.next().await
+        self.pump.next().await
     }
 }
 

@@ -12,11 +12,6 @@ use crate::{About, LinkError, Names, Stream};
 /// For so long groups are kept that are not the newest: who has just begun to take one may end it.
 const KEPT: std::time::Duration = std::time::Duration::from_secs(10);
 
-/// Importance of tracks, the most important first to come where a link is full.
-const STATE_PRIORITY: u8 = 200;
-const LIGHT_PRIORITY: u8 = 150;
-const SNAPSHOT_PRIORITY: u8 = 140;
-
 /// What a host publishes; it ends when this is dropped.
 pub struct Broadcast {
     broadcast: broadcast::Producer,
@@ -36,6 +31,8 @@ struct Groups {
     track: track::Producer,
     next: u64,
     group: Option<group::Producer>,
+    /// Whether a group's last frame is an empty one, which says that all of it was there.
+    is_marked: bool,
 }
 
 /// Bytes that many share, without a copy for each.
@@ -77,21 +74,21 @@ impl Broadcast {
                 .collect(),
         };
         let broadcast = origin.create_broadcast(names.shared())?;
-        let track = |name: &str, priority: u8| {
-            let info = track::Info::default().with_priority(priority).with_max_age(KEPT);
+        let track = |name: &str| {
+            let info = track::Info::default().with_max_age(KEPT);
             broadcast.create_track(name.to_owned(), info)
         };
-        let about_track = track(ABOUT, STATE_PRIORITY)?;
+        let about_track = track(ABOUT)?;
         let mut group = about_track.create_group(group::Info { sequence: first_group })?;
         group.write_frame(Timestamp::now(), about.to_text())?;
         group.finish()?;
-        let state = Groups::new(track(STATE, STATE_PRIORITY)?, first_group);
+        let state = Groups::new(track(STATE)?, first_group, false);
         let streams = (0..about.streams.len())
             .map(|rung| {
                 Ok(Light {
                     groups: LightGroups::new(rung),
-                    light: Groups::new(track(&light(rung), LIGHT_PRIORITY)?, first_group),
-                    snapshots: track(&snapshot(rung), SNAPSHOT_PRIORITY)?,
+                    light: Groups::new(track(&light(rung))?, first_group, true),
+                    snapshots: track(&snapshot(rung))?,
                 })
             })
             .collect::<Result<Vec<_>, LinkError>>()?;
@@ -173,8 +170,8 @@ impl Light {
 }
 
 impl Groups {
-    fn new(track: track::Producer, first: u64) -> Groups {
-        Groups { track, next: first, group: None }
+    fn new(track: track::Producer, first: u64, is_marked: bool) -> Groups {
+        Groups { track, next: first, group: None, is_marked }
     }
 
     fn begin(&mut self) -> Result<(), LinkError> {
@@ -199,7 +196,12 @@ impl Groups {
 
     fn end(&mut self) -> Result<(), LinkError> {
         match self.group.take() {
-            Some(group) => Ok(group.finish()?),
+            Some(mut group) => {
+                if self.is_marked {
+                    group.write_frame(Timestamp::now(), Bytes::new())?;
+                }
+                Ok(group.finish()?)
+            }
             None => Ok(()),
         }
     }

@@ -76,20 +76,23 @@ impl Names {
         format!("{}/out/{viewer}", self.base)
     }
 
-    /// What viewers may read who are connected to the host itself: not each other's words. The names of what is said to them are secrets.
-    ///
-    /// # Errors
-    /// None, for names that were checked.
-    pub fn readable(&self) -> Result<Patterns, LinkError> {
-        patterns(&[self.base.clone(), format!("{}/out/*", self.base)])
+    /// The path at which one viewer connects to the host itself; with `{viewer}` in its place it is told to all.
+    pub fn path_of(&self, viewer: &str) -> String {
+        format!("/{}/{viewer}", self.base)
     }
 
-    /// What viewers may write who are connected to the host itself.
+    /// The viewer that connects at a path; `None` if that is none of this host's.
+    pub fn viewer_at<'a>(&self, path: &'a str) -> Option<&'a str> {
+        let viewer = path.strip_prefix('/')?.strip_prefix(&self.base)?.strip_prefix('/')?;
+        is_viewer(viewer).then_some(viewer)
+    }
+
+    /// What a viewer may read, and what it may write (`*` for all viewers): of other viewers nothing, not even that they are there.
     ///
     /// # Errors
     /// None, for names that were checked.
-    pub fn writable(&self) -> Result<Patterns, LinkError> {
-        patterns(&[format!("{}/in/*", self.base)])
+    pub fn rights(&self, viewer: &str) -> Result<(Patterns, Patterns), LinkError> {
+        Ok((patterns(&[self.base.clone(), self.to_viewer(viewer)])?, patterns(&[self.from_viewer(viewer)])?))
     }
 }
 
@@ -123,11 +126,19 @@ mod tests {
             assert!(check_name(name).is_err(), "{name}");
         }
         let names = Names::new("dapple/room").unwrap();
-        let (readable, writable) = (names.readable().unwrap(), names.writable().unwrap());
+        let (readable, writable) = names.rights("*").unwrap();
         assert!(readable.matches("dapple/room") && readable.matches(&names.to_viewer("ab")));
         assert!(!readable.matches(&names.from_viewer("ab")) && !readable.matches("dapple"));
         assert!(writable.matches(&names.from_viewer("ab")) && !writable.matches(&names.to_viewer("ab")));
         assert!(!writable.matches("dapple/room") && !writable.matches("dapple/room/in/a/b"));
+        let (one, other) = ("0f".repeat(16), "0e".repeat(16));
+        let (readable, writable) = names.rights(&one).unwrap();
+        assert!(readable.matches("dapple/room") && readable.matches(&names.to_viewer(&one)));
+        assert!(!readable.matches(&names.to_viewer(&other)) && !writable.matches(&names.from_viewer(&other)));
+        assert_eq!(names.viewer_at(&names.path_of(&one)), Some(&one[..]));
+        for path in ["/", "", "/dapple/room", "/dapple/room/", "/dapple/room/ab", "/dapple/other/x"] {
+            assert_eq!(names.viewer_at(path), None, "{path}");
+        }
     }
 
     #[test]

@@ -11,9 +11,14 @@ use crate::LinkError;
 /// How long a group may take to come once a newer one has begun.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// How a track is asked for.
+/// How words and the state are asked for: they go before light where a link is full.
 pub(crate) fn subscription() -> Subscription {
-    Subscription::default().with_max_age(PATIENCE)
+    light_subscription().with_priority(2)
+}
+
+/// How light is asked for.
+pub(crate) fn light_subscription() -> Subscription {
+    Subscription::default().with_max_age(PATIENCE).with_priority(1)
 }
 
 /// The next frame of a group, `None` at its end.

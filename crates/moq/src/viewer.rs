@@ -11,7 +11,7 @@ use moq_net::{Timestamp, broadcast, group, origin, track};
 use crate::about::MAX_ABOUT_BYTES;
 use crate::names::{ABOUT, LOOKS, STATE, TALK, light, snapshot};
 use crate::pump::{Messages, Pump};
-use crate::texts::{Texts, read, subscription};
+use crate::texts::{Texts, light_subscription, read, subscription};
 use crate::{About, LinkError, Message, Names};
 
 /// Most messages of a group of words.
@@ -203,10 +203,11 @@ impl Reader {
         if let Some(refusal) = self.refusal {
             return messages.put(Message::Text(FromHost::Refused(refusal).to_text())).await;
         }
-        let (welcomed, is_welcome) = oneshot::channel();
-        let state = state(&self.shared, messages.clone(), welcomed);
-        let light = Light::read(&self.shared, self.rung, &self.lost, messages.clone());
-        let words = words(&self.from, &self.to_viewer, messages, is_welcome);
+        let (for_light, light_may) = oneshot::channel();
+        let (for_words, words_may) = oneshot::channel();
+        let state = state(&self.shared, messages.clone(), [for_light, for_words]);
+        let light = Light::read(&self.shared, self.rung, &self.lost, messages.clone(), light_may);
+        let words = words(&self.from, &self.to_viewer, messages, words_may);
         let shared = Box::pin(try_join(state, light));
         match select(shared, Box::pin(words)).await {
             Either::Left((ended, _)) => ended.map(|_| ()),
@@ -219,7 +220,7 @@ impl Reader {
 async fn state(
     shared: &broadcast::Consumer,
     mut messages: Messages,
-    welcomed: oneshot::Sender<()>,
+    welcomed: [oneshot::Sender<()>; 2],
 ) -> Result<(), LinkError> {
     let mut texts = Texts::new(shared.track(STATE)?.subscribe(subscription()).await?, MAX_FROM_HOST_BYTES);
     let mut welcomed = Some(welcomed);
@@ -229,8 +230,8 @@ async fn state(
             continue;
         }
         messages.put(Message::Text(text)).await?;
-        if let Some(welcomed) = welcomed.take() {
-            let _ = welcomed.send(());
+        for waits in welcomed.take().into_iter().flatten() {
+            let _ = waits.send(());
         }
     }
     Ok(())
@@ -261,65 +262,81 @@ async fn words(
 }
 
 /// A stream of light, group after group.
-struct Light {
+struct Light<'a> {
     track: track::Consumer,
     snapshots: track::Consumer,
     messages: Messages,
-    /// The group that was read last, and whether all of it was.
-    last: Option<(u64, bool)>,
+    /// The group that was read last, if all of it was.
+    last: Option<u64>,
+    /// Breaks that the viewer told of, and those that were mended.
+    lost: &'a AtomicU32,
+    mended: u32,
 }
 
-impl Light {
+impl Light<'_> {
     async fn read(
         shared: &broadcast::Consumer,
         rung: usize,
         lost: &AtomicU32,
         messages: Messages,
+        is_welcome: oneshot::Receiver<()>,
     ) -> Result<(), LinkError> {
         let (track, snapshots) = (shared.track(&light(rung))?, shared.track(&snapshot(rung))?);
-        let mut groups = track.subscribe(subscription()).await?.ordered();
-        let mut light = Light { track, snapshots, messages, last: None };
+        let mut groups = track.subscribe(light_subscription()).await?.ordered();
+        // A welcome says what becomes of light that was held before.
+        let _ = is_welcome.await;
+        let mended = lost.load(Ordering::Relaxed);
+        let mut light = Light { track, snapshots, messages, last: None, lost, mended };
         while let Some(mut group) = groups.next_group().await? {
             let sequence = group.sequence;
-            let follows = light.last.is_some_and(|(last, is_whole)| is_whole && last + 1 == sequence);
-            if !follows {
-                light.snapshot(sequence).await?;
+            let follows = light.last.is_some_and(|last| last + 1 == sequence) && !light.is_broken();
+            light.last = None;
+            if !follows && !light.snapshot(sequence).await? {
+                // It is gone; the next group has one too.
+                continue;
             }
-            let is_whole = light.group(&mut group, sequence, lost).await?;
-            light.last = Some((sequence, is_whole));
+            if light.group(&mut group, sequence).await? {
+                light.last = Some(sequence);
+            }
         }
         Ok(())
     }
 
-    /// What a group builds on.
-    async fn snapshot(&mut self, sequence: u64) -> Result<(), LinkError> {
-        let mut group = self.snapshots.fetch_group(sequence, None).await?;
-        while let Some(bytes) = read(&mut group, MAX_LIGHT_MESSAGE_BYTES).await? {
-            self.messages.put(Message::Bytes(bytes)).await?;
-        }
-        Ok(())
+    /// Whether the viewer has found that something does not fit since this was mended last.
+    fn is_broken(&self) -> bool {
+        self.lost.load(Ordering::Relaxed) != self.mended
     }
 
-    /// All of a group; false if it was cut off. When the viewer finds that something does not fit, it gets the group again from its snapshot on.
-    async fn group(
-        &mut self,
-        group: &mut group::Consumer,
-        sequence: u64,
-        lost: &AtomicU32,
-    ) -> Result<bool, LinkError> {
-        let mut mended = lost.load(Ordering::Relaxed);
+    /// What a group builds on; false if it cannot be had.
+    async fn snapshot(&mut self, sequence: u64) -> Result<bool, LinkError> {
+        self.mended = self.lost.load(Ordering::Relaxed);
+        let Ok(mut group) = self.snapshots.fetch_group(sequence, None).await else { return Ok(false) };
         loop {
-            let now = lost.load(Ordering::Relaxed);
-            if now > mended {
-                tracing::debug!(sequence, "light did not fit: once more from the group's snapshot");
-                mended = now;
-                self.snapshot(sequence).await?;
-                *group = self.track.fetch_group(sequence, None).await?;
-            }
-            match read(group, MAX_LIGHT_MESSAGE_BYTES).await {
+            match read(&mut group, MAX_LIGHT_MESSAGE_BYTES).await {
                 Ok(Some(bytes)) => self.messages.put(Message::Bytes(bytes)).await?,
                 Ok(None) => return Ok(true),
                 Err(LinkError::Ended(_)) => return Ok(false),
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// All of a group; false if it was cut off. When the viewer finds that something does not fit, it gets the group again from its snapshot on.
+    async fn group(&mut self, group: &mut group::Consumer, sequence: u64) -> Result<bool, LinkError> {
+        loop {
+            if self.is_broken() {
+                tracing::debug!(sequence, "light did not fit: once more from the group's snapshot");
+                if !self.snapshot(sequence).await? {
+                    return Ok(false);
+                }
+                let Ok(again) = self.track.fetch_group(sequence, None).await else { return Ok(false) };
+                *group = again;
+            }
+            match read(group, MAX_LIGHT_MESSAGE_BYTES).await {
+                // The mark at its end.
+                Ok(Some(bytes)) if bytes.is_empty() => return Ok(true),
+                Ok(Some(bytes)) => self.messages.put(Message::Bytes(bytes)).await?,
+                Ok(None) | Err(LinkError::Ended(_)) => return Ok(false),
                 Err(error) => return Err(error),
             }
         }

@@ -82,6 +82,8 @@ pub struct Guest {
     welcome: Option<Welcome>,
     key: Option<String>,
     is_connected: bool,
+    /// Whether the host has welcomed this very viewer over this connection.
+    is_known: bool,
     edits: Edits,
     clock: SceneClock,
     version: u64,
@@ -109,6 +111,7 @@ impl Guest {
             welcome: None,
             key: None,
             is_connected: false,
+            is_known: false,
             clock: SceneClock::default(),
             version: 0,
             held: None,
@@ -129,6 +132,7 @@ impl Guest {
     /// There is a connection: the next message is a hello.
     pub fn connected(&mut self, now_us: u64) {
         (self.is_connected, self.hello_us, self.welcome) = (true, None, None);
+        self.is_known = false;
         (self.look.came, self.look.lost, self.said_us) = (0, 0, now_us);
         (self.look.heard_us, self.heard_at_us) = (0, now_us);
         // Versions count anew with another host; what was changed stays until the state comes.
@@ -150,16 +154,23 @@ impl Guest {
     /// The conversation cannot go on; what was held stays.
     pub fn receive_text(&mut self, text: &str) -> Result<News, GuestError> {
         Ok(match FromHost::parse(text)? {
+            // That of a stream which many share: nobody's in particular.
+            FromHost::Welcome(welcome) if welcome.key.is_empty() => {
+                if self.is_known {
+                    return Ok(News::Nothing);
+                }
+                self.backoff.reset();
+                let goes_on = self.light_goes_on(&welcome);
+                self.welcome = Some(welcome);
+                News::Welcome(goes_on)
+            }
             FromHost::Welcome(welcome) => {
                 self.backoff.reset();
+                self.is_known = true;
                 if self.key.as_deref() != Some(&welcome.key) {
                     self.pending.renumber();
                 }
-                let goes_on = welcome.goes_on;
-                if !goes_on {
-                    self.held = None;
-                    self.timing = Timing::default();
-                }
+                let goes_on = self.light_goes_on(&welcome);
                 self.pending.heard(welcome.heard);
                 self.key = Some(welcome.key.clone());
                 self.welcome = Some(welcome);
@@ -195,12 +206,26 @@ impl Guest {
                 self.pending.heard(number);
                 News::Rejected(message)
             }
-            FromHost::Status(status) => {
+            FromHost::Status(mut status) => {
+                if status.round_trip_us == 0 {
+                    // One for all knows nothing of this viewer's way.
+                    (status.round_trip_us, status.queue_us) =
+                        (self.status.round_trip_us, self.status.queue_us);
+                }
                 self.status = status;
                 self.timing.round_trip(status.round_trip_us);
                 News::Nothing
             }
         })
+    }
+
+    /// Whether light goes on; if not, what is known of the stream before is of no use.
+    fn light_goes_on(&mut self, welcome: &Welcome) -> bool {
+        if !welcome.goes_on {
+            self.held = None;
+            self.timing = Timing::default();
+        }
+        welcome.goes_on
     }
 
     /// Takes bytes: a piece of light.
@@ -271,7 +296,9 @@ impl Guest {
             return Some(FromViewer::Hello(self.hello()).to_text());
         }
         let per_s = self.welcome.as_ref().map_or(1, |welcome| welcome.events_per_s);
-        if let Some((number, event)) = self.pending.next(now_us, per_s) {
+        if self.is_known
+            && let Some((number, event)) = self.pending.next(now_us, per_s)
+        {
             return Some(FromViewer::Event { number, event }.to_text());
         }
         self.next_look(now_us)

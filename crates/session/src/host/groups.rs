@@ -56,18 +56,20 @@ impl LightGroups {
 
     /// What is to be written next.
     pub fn next(&mut self, host: &mut Host, now_us: u64) -> Piece<Vec<Arc<[u8]>>> {
-        if let Some(held) = self.held
-            && self.is_due(now_us)
-            && let Some(snapshot) = host.shared_snapshot(self.rung, held)
-        {
-            return self.begin(snapshot, now_us);
-        }
         match host.next_shared(self.rung, self.held) {
             Shared::Wait => Piece::Wait,
             Shared::Snapshot(snapshot) => self.begin(snapshot, now_us),
             Shared::Delta(light) => {
                 self.held = Some(light.held);
                 self.more(light.messages, now_us)
+            }
+            // Asked for only now, so that none is made which is not used.
+            Shared::UpToDate
+                if self.is_due(now_us)
+                    && let Some(held) = self.held
+                    && let Some(snapshot) = host.shared_snapshot(self.rung, held) =>
+            {
+                self.begin(snapshot, now_us)
             }
             Shared::UpToDate => match host.tick() {
                 Some(tick) if now_us.saturating_sub(self.last_us) >= TICK_EVERY_US => {

@@ -56,6 +56,8 @@ pub(super) struct Viewer {
     /// The rung that it asked for.
     asked: usize,
     pace: Pace,
+    /// Bytes that were given out over this connection once the stream's first light was.
+    first_given: Option<u64>,
     /// When it came, by the calendar and by the host's clock, microseconds.
     came_us: (u64, u64),
     light: Sent,
@@ -110,6 +112,7 @@ impl Viewer {
             rung: 0,
             asked: 0,
             pace: Pace::new(now_us),
+            first_given: None,
             came_us: (0, now_us),
             light: Sent::default(),
             look_number: 0,
@@ -132,6 +135,7 @@ impl Viewer {
         self.shares = arrival.shares;
         self.connection = self.connection.wrapping_add(1);
         (self.role, self.rung, self.left_us, self.expelled) = (role, rung, None, None);
+        self.first_given = None;
         (self.asked, self.pace, self.came_us) = (rung, Pace::new(now_us), (arrival.unix_us, now_us));
         (self.last_message_us, self.state_sent) = (now_us, 0);
         if is_reliable {
@@ -165,7 +169,7 @@ impl Viewer {
             return false;
         }
         let Some(rung) = self.pace.better(self.rung, self.asked, leanest, now_us) else { return false };
-        (self.rung, self.light.held) = (rung, None);
+        (self.rung, self.light.held, self.first_given) = (rung, None, None);
         true
     }
 
@@ -256,7 +260,7 @@ impl Viewer {
             }
         }
         self.light.heard(look, now_us);
-        self.pace.has_light |= look.held.is_some();
+        self.pace.has_light |= self.first_given.is_some_and(|given| look.came >= given);
         // A stamp of the future is none of ours.
         let passed_us = now_us.checked_sub(look.heard_us).filter(|_| look.heard_us > 0)?;
         let round_us = passed_us.checked_sub(look.waited_us)?;
@@ -285,11 +289,13 @@ impl Viewer {
         if let Some((entry, next)) = &mut light.sending {
             let message = entry.messages[*next].clone();
             *next += 1;
-            if *next == entry.messages.len() {
-                light.sending = None;
-            }
+            let is_whole = *next == entry.messages.len();
             light.frame_us = now_us;
             light.give(&message, now_us);
+            if is_whole {
+                light.sending = None;
+                self.first_given.get_or_insert(light.given);
+            }
             return Some(message);
         }
         let is_full = light.is_congested(config.window_us, now_us);
@@ -320,10 +326,12 @@ impl Viewer {
         (light.held, light.frame_us) = (Some(entry.held), now_us);
         self.queue_us = now_us.saturating_sub(entry.made_us);
         let message = entry.messages[0].clone();
+        light.give(&message, now_us);
         if entry.messages.len() > 1 {
             light.sending = Some((entry, 1));
+        } else {
+            self.first_given.get_or_insert(light.given);
         }
-        light.give(&message, now_us);
         Some(message)
     }
 }
