@@ -129,7 +129,14 @@ pub(crate) async fn keep(
     let mut is_first = true;
     loop {
         state.send_replace(LinkState::Connecting);
-        let known = if is_first { Ok(()) } else { address.again().await };
+        let known = if is_first {
+            Ok(())
+        } else {
+            tokio::select! {
+                known = address.again() => known,
+                () = told(&mut stop) => return,
+            }
+        };
         is_first = false;
         let ended = match known {
             Ok(()) => converse(&address, shared, state, &mut stop, &mut on_news).await,

@@ -33,7 +33,7 @@ pub(crate) struct ViewerJson {
 /// A live session over Media over QUIC.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct MoqJson {
-    /// Address of the host itself or of a relay, `https://…`.
+    /// Address of the host itself or of a relay, `https://…`; `{viewer}` in it stands for the viewer's name.
     pub(crate) url: String,
     /// The name of its broadcast.
     pub(crate) name: String,
@@ -41,6 +41,13 @@ pub(crate) struct MoqJson {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) certificate: Option<String>,
 }
+
+/// Stands in an address for the name under which whoever it asked reaches the server.
+pub(crate) const HOST: &str = "{host}";
+
+/// Stands in an address for the name that the viewer has drawn.
+#[cfg(feature = "moq")]
+pub(crate) const VIEWER: &str = "{viewer}";
 
 /// So many spare instances like one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -48,15 +48,24 @@ impl At {
         At { url: text("url").unwrap(), name: text("name").unwrap(), certificate: text("certificate") }
     }
 
-    async fn connect(&self) -> (Connection, origin::Producer, origin::Producer) {
+    async fn connect(&self, viewer: &str) -> (Connection, origin::Producer, origin::Producer) {
+        self.try_connect(viewer).await.unwrap()
+    }
+
+    async fn try_connect(
+        &self,
+        viewer: &str,
+    ) -> Result<(Connection, origin::Producer, origin::Producer), String> {
         let mut config = moq_tokio::connect::Config::default();
         config.tls.fingerprint = self.certificate.clone().into_iter().collect();
         let (from, to) = (moq_tokio::origin::spawn(), moq_tokio::origin::spawn());
         let client = config.init(Default::default()).unwrap().with_reconnect(false);
         let client = client.with_publisher(&to).with_subscriber(from.clone());
-        let connecting = client.connect(self.url.parse::<url::Url>().unwrap()).established();
-        let connection = tokio::time::timeout(Duration::from_secs(10), connecting).await.unwrap().unwrap();
-        (connection, from, to)
+        let url: url::Url = self.url.replace("{viewer}", viewer).parse().unwrap();
+        let connecting = client.connect(url).established();
+        let connected = tokio::time::timeout(Duration::from_secs(10), connecting).await;
+        let connection = connected.map_err(|_| "no answer")?.map_err(|error| error.to_string())?;
+        Ok((connection, from, to))
     }
 }
 
@@ -75,16 +84,13 @@ struct MoqViewer {
 
 impl MoqViewer {
     async fn join(at: &At, scene: &Arc<Scene>, config: GuestConfig) -> MoqViewer {
-        let connection = at.connect().await;
-        let mut guest = Guest::new(scene.clone(), config);
-        let hello = guest.hello();
         let mut secret = [0; 16];
         getrandom::fill(&mut secret).unwrap();
-        let wish = Wish {
-            scene: hello.scene,
-            bits_per_s: hello.bits_per_s,
-            viewer: dapple_session::host::hex(&secret),
-        };
+        let viewer = dapple_session::host::hex(&secret);
+        let connection = at.connect(&viewer).await;
+        let mut guest = Guest::new(scene.clone(), config);
+        let hello = guest.hello();
+        let wish = Wish { scene: hello.scene, bits_per_s: hello.bits_per_s, viewer };
         let names = Names::new(&at.name).unwrap();
         let from = connection.1.consume();
         let joining = dapple_moq::join(&from, &connection.2, &names, &wish);
@@ -316,39 +322,56 @@ fn who_breaks_rules_is_not_heard_and_nobody_else_notices() {
     runtime().block_on(async {
         let mut steady = MoqViewer::join(&at, &scene, config(1)).await;
         steady.until("the first light", MoqViewer::has_light).await;
-        let (_connection, _from, to) = at.connect().await;
         let names = Names::new(&at.name).unwrap();
-        let mut kept = Vec::new();
-        let say = |viewer: &str, frames: &[Vec<u8>]| {
-            let broadcast = to.create_broadcast(names.from_viewer(viewer).as_str()).unwrap();
-            let (talk, looks) = (
-                broadcast.create_track("talk", None).unwrap(),
-                broadcast.create_track("looks", None).unwrap(),
-            );
-            let mut group = talk.append_group().unwrap();
-            for frame in frames {
-                let _ = group.write_frame(Timestamp::now(), frame.clone());
-            }
-            let _ = broadcast.announce(origin::Route::default());
-            (broadcast, talk, looks, group)
-        };
         let name = |number: usize| format!("{number:032x}");
-        // Random bytes, a huge message, words without a hello, another version, and many that say nothing.
-        kept.push(say(&name(1), &[vec![0xff; 100]]));
-        kept.push(say(&name(2), &[vec![b' '; 8 << 20]]));
-        kept.push(say(&name(3), &[br#"{"type":"bye"}"#.to_vec()]));
-        kept.push(say(&name(4), &[br#"{"type":"hello","protocol":999,"wire":1,"scene":"00"}"#.to_vec()]));
-        for number in 10..300 {
-            kept.push(say(&name(number), &[]));
+        // Random bytes, a huge message, words without a hello, another version, nothing at all.
+        let huge = vec![b' '; 8 << 20];
+        let said: [&[u8]; 5] = [
+            &[0xff; 100],
+            &huge,
+            br#"{"type":"bye"}"#,
+            br#"{"type":"hello","protocol":999,"wire":1,"scene":"00"}"#,
+            b"",
+        ];
+        let mut kept = Vec::new();
+        for (number, said) in said.into_iter().enumerate() {
+            let (connection, from, to) = at.connect(&name(number)).await;
+            let own = to.create_broadcast(names.from_viewer(&name(number)).as_str()).unwrap();
+            let tracks = ["talk", "looks"].map(|track| own.create_track(track, None).unwrap());
+            let mut group = tracks[0].append_group().unwrap();
+            if !said.is_empty() {
+                let _ = group.write_frame(Timestamp::now(), said.to_vec());
+            }
+            own.announce(origin::Route::default()).unwrap();
+            // In the name of others, and of the host.
+            let others = [names.from_viewer(&name(77)), names.to_viewer(&name(77)), at.name.clone()];
+            let forged = others.map(|path| {
+                let broadcast = to.create_broadcast(path.as_str()).unwrap();
+                let state = broadcast.create_track("state", None).unwrap();
+                let mut group = state.append_group().unwrap();
+                let refused = r#"{"type":"refused","reason":"closing","message":"forged"}"#;
+                group.write_frame(Timestamp::now(), refused).unwrap();
+                let _ = broadcast.announce(origin::Route::default());
+                (broadcast, state, group)
+            });
+            // It hears of nobody but the host and itself.
+            let mut announced = from.consume().with_hidden(true).announced();
+            let own_out = names.to_viewer(&name(number));
+            let until = Instant::now() + Duration::from_millis(500);
+            while let Ok(Some(update)) = tokio::time::timeout_at(until.into(), announced.next()).await {
+                let path = update.prefix.as_str();
+                assert!(path == at.name || path == own_out, "it hears of {path}");
+            }
+            kept.push((connection, from, to, own, tracks, group, forged));
         }
-        // A name that is none, and one that is somebody's to be written to only by the host.
-        kept.push(say("short", &[br#"{"type":"bye"}"#.to_vec()]));
-        let forged = to.create_broadcast(at.name.as_str()).unwrap();
-        let state = forged.create_track("state", None).unwrap();
-        let mut group = state.append_group().unwrap();
-        let refused = r#"{"type":"refused","reason":"closing","message":"forged"}"#;
-        group.write_frame(Timestamp::now(), refused).unwrap();
-        let _ = forged.announce(origin::Route::default());
+        // Whoever does not know the name learns nothing.
+        let stranger = At { url: at.url.replace(&at.name, "dapple/other"), ..at.clone() };
+        if let Ok((connection, from, _to)) = stranger.try_connect(&name(9)).await {
+            let mut announced = from.consume().announced();
+            let heard = tokio::time::timeout(Duration::from_secs(1), announced.next()).await;
+            assert!(!matches!(heard, Ok(Some(_))), "a stranger hears of what there is");
+            drop(connection);
+        }
         let start = Instant::now();
         while start.elapsed() < Duration::from_secs(7) {
             steady.talk().await;
@@ -368,7 +391,7 @@ fn who_breaks_rules_is_not_heard_and_nobody_else_notices() {
 }
 
 #[test]
-fn a_host_that_ends_says_so_and_one_that_dies_is_noticed() {
+fn a_host_that_ends_says_so() {
     let folder = TempDir::new().unwrap();
     let served = Served::start(folder.path(), 0, &["--moq"]);
     let (at, scene) = (At::of(&served), served.scene());
@@ -391,12 +414,31 @@ fn a_host_that_ends_says_so_and_one_that_dies_is_noticed() {
 }
 
 #[test]
+fn a_host_that_dies_is_noticed_and_its_successor_found() {
+    let folder = TempDir::new().unwrap();
+    let served = Served::start(folder.path(), 0, &["--moq"]);
+    let (at, scene, port) = (At::of(&served), served.scene(), served.port);
+    let runtime = runtime();
+    let mut viewer = runtime.block_on(MoqViewer::join(&at, &scene, config(1)));
+    runtime.block_on(viewer.until("the first light", MoqViewer::has_light));
+    served.signal("-KILL");
+    assert!(!served.wait().0);
+    runtime.block_on(viewer.until("it is noticed", |v| v.ended.is_some()));
+    let served = Served::start(folder.path(), port, &["--moq"]);
+    let next = At::of(&served);
+    assert_ne!(at.name, next.name);
+    let mut viewer = runtime.block_on(MoqViewer::join(&next, &scene, config(1)));
+    runtime.block_on(viewer.until("the light of the next", MoqViewer::has_light));
+}
+
+#[test]
 fn what_cannot_be_is_said_clearly() {
     let folder = TempDir::new().unwrap();
     let serve = ["serve", "--builtin", "cornell", "--port", "0"];
     let with = |more: &[&'static str]| [&serve[..], more].concat();
     fail(folder.path(), &with(&["--moq-name", "x"]), &["--moq"]);
     fail(folder.path(), &with(&["--moq", "--moq-name", "a b"]), &["a b", "letters"]);
+    fail(folder.path(), &with(&["--moq", "--token", "view=a"]), &["--moq", "--token view"]);
     fail(folder.path(), &with(&["--relay", "nowhere"]), &["--relay", "nowhere"]);
     fail(folder.path(), &with(&["--relay", "ftp://host/"]), &["--relay", "https://"]);
     let taken = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -484,12 +526,12 @@ fn over_a_bad_way_and_after_a_stall_the_light_is_the_same() {
     let folder = TempDir::new().unwrap();
     let served = Served::start(folder.path(), 0, &["--moq", "--threshold", "0"]);
     let (at, scene) = (At::of(&served), served.scene());
-    let port = at.url.trim_end_matches('/').rsplit(':').next().unwrap().parse().unwrap();
+    let port = at.url.parse::<url::Url>().unwrap().port().unwrap();
     let mut oracle = Viewer::join(served.port, &scene, config(1));
     oracle.until("the first light", Viewer::has_light);
     runtime().block_on(async {
         let way = BadWay::to(port, 7).await;
-        let bad = At { url: format!("https://127.0.0.1:{}/", way.port), ..at.clone() };
+        let bad = At { url: at.url.replace(&format!(":{port}/"), &format!(":{}/", way.port)), ..at.clone() };
         let mut shaky = MoqViewer::join(&bad, &scene, config(2)).await;
         let mut stalled = MoqViewer::join(&at, &scene, config(3)).await;
         for viewer in [&mut shaky, &mut stalled] {

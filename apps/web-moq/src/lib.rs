@@ -94,7 +94,15 @@ async fn converse(
     let client = Client::new().with_publisher(&to).with_subscriber(from.clone());
     let (session, driver) = client.connect_lite(now(), transport).await?;
     spawn_local(async { drop(time::run(driver).await) });
-    let (mut out, mut inbound) = dapple_moq::join(&from.consume(), &to, &names, wish).await?;
+    let (mut out, mut inbound) = {
+        let consumer = from.consume();
+        let joining = Box::pin(dapple_moq::join(&consumer, &to, &names, wish));
+        // Nothing is said before it has joined but that it is to end.
+        match select(joining, said.next()).await {
+            Either::Left((joined, _)) => joined?,
+            Either::Right(_) => return Ok(()),
+        }
+    };
     let _ = on_open.call0(&JsValue::NULL);
     loop {
         let word = {

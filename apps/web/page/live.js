@@ -30,6 +30,9 @@ export class LiveLink {
   #moq;
   #bits;
   #isMoq = false;
+  // Whether it ever carried this session, and how often in a row it then could not be opened.
+  #moqWorks = false;
+  #moqFailures = 0;
   #detach = [];
   // connecting, live, reconnecting, refused, closed
   #state = "connecting";
@@ -110,15 +113,14 @@ export class LiveLink {
     const ours = (act) => (event) => this.#socket === socket && act(event);
     socket.onopen = ours(() => {
       this.#wasOpen = true;
+      if (this.#isMoq) [this.#moqWorks, this.#moqFailures] = [true, 0];
       this.#heardAt = performance.now();
       this.#core()?.liveConnected(performance.now() / 1000);
       this.#pump();
     });
     socket.onmessage = ours((event) => this.#take(event.data));
     socket.onclose = ours(() => {
-      if (this.#isMoq && !this.#wasOpen && this.#url) {
-        // UDP may be closed to this viewer, and the page's own way open.
-        this.#moq = null;
+      if (this.#isMoq && !this.#wasOpen && this.#givesUpMoq()) {
         this.#drop();
         this.#connect();
         return;
@@ -161,7 +163,7 @@ export class LiveLink {
     const core = this.#core();
     if (!core || !this.#socket) return;
     if (performance.now() - this.#heardAt > SILENCE && this.#mayBeGone(core)) {
-      if (!this.#wasOpen) this.#moq = null;
+      if (this.#isMoq && !this.#wasOpen) this.#givesUpMoq();
       this.#broke();
       return;
     }
@@ -171,6 +173,14 @@ export class LiveLink {
       if (message === undefined) return;
       this.#socket.send(message);
     }
+  }
+
+  // UDP may be closed to this viewer and the page's own way open; what worked before is tried some times more.
+  #givesUpMoq() {
+    this.#moqFailures += 1;
+    if (this.#moqWorks && this.#moqFailures < 4) return false;
+    this.#moq = null;
+    return true;
   }
 
   // A server that is still making its first light says nothing: that is no silence.

@@ -18,8 +18,8 @@ async function load() {
 
 // A relay at an address of http: tells the hash of its certificate there.
 async function certified(place) {
+  if (!place.url.startsWith("http:")) return place;
   const url = new URL(place.url);
-  if (url.protocol !== "http:") return place;
   const response = await fetch(new URL("/certificate.sha256", url));
   if (!response.ok) throw new Error(`${url} does not tell the hash of its certificate`);
   const certificate = (await response.text()).trim();
@@ -45,6 +45,7 @@ export class MoqSocket {
     Promise.all([load(), certified(place)]).then(
       ([{ MoqLink }, { url, name, certificate }]) => {
         if (this.#state !== WebSocket.CONNECTING) return;
+        const address = url.replace("{viewer}", viewer);
         const opened = () => {
           if (this.#state !== WebSocket.CONNECTING) return;
           this.#state = WebSocket.OPEN;
@@ -52,7 +53,7 @@ export class MoqSocket {
         };
         const came = (data) => this.#state === WebSocket.OPEN && this.onmessage?.({ data });
         const closed = (reason) => this.#ended(reason);
-        this.#link = new MoqLink(url, name, certificate, scene, viewer, bits || undefined, opened, came, closed);
+        this.#link = new MoqLink(address, name, certificate, scene, viewer, bits || undefined, opened, came, closed);
       },
       (error) => this.#ended(error.message),
     );

@@ -55,6 +55,9 @@ const DEFAULT_HZ: f64 = 30.0;
 /// How long viewers have to go once the program is told to stop.
 const DRAIN: Duration = Duration::from_secs(5);
 
+/// How long those that only look on have to hear that it ends.
+const LAST_WORDS: Duration = Duration::from_secs(2);
+
 /// How the names of threads begin that trace and encode.
 pub(crate) const LIGHT_THREADS: &str = "light";
 
@@ -133,8 +136,14 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     };
     let (stop_accepting, stop) = watch::channel(false);
     let most = args.max_viewers as usize + OTHER_CONNECTIONS;
-    let moq = start_moq(args, &hub, &runtime, first_group, most)?;
-    let router = web::router(hub.clone(), asset.clone(), work, page, moq.clone());
+    if args.moq.is_some() && access.open_role().is_none() {
+        bail!(
+            "--moq: over QUIC whoever knows the session's name may look, without a token. Leave out --moq or --token view=…, or publish to a \
+             --relay that asks for tokens itself"
+        );
+    }
+    let (moq, publishing) = start_moq(args, &hub, &runtime, first_group, most)?.unzip();
+    let router = web::router(hub.clone(), asset.clone(), work, page, moq);
     raise_file_limit(most as u64 + 64);
     let is_secure = tls.is_some();
     runtime.spawn(accept::accept(listener, router, tls, most, stop));
@@ -145,7 +154,7 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
         Engine { hub: hub.clone(), config, hz, ration, recording, workers, stop: stop_light.clone() };
     let engine = start(engine, args.threads)?;
     let url = url_of(address, if is_secure { "https" } else { "http" });
-    announce(&url, &asset, has_page, is_secure, moq.as_ref());
+    announce(&url, &asset, has_page, is_secure, publishing.is_some());
     if let Some(parts) = args.workers {
         say!("It waits for workers: dapple worker --connect {url} --shard 1/{parts}, to {parts}/{parts}\n");
     }
@@ -156,7 +165,7 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     }
     let ended = wait(&runtime, &hub);
 
-    drain(&runtime, &hub, &stop_accepting);
+    drain(&runtime, &hub, &stop_accepting, publishing);
     stop_light.store(true, Ordering::Relaxed);
     let until = Instant::now() + LAST_STEP;
     while !engine.is_finished() && Instant::now() < until {
@@ -175,7 +184,10 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     light.and(ended)
 }
 
-/// Serves over MoQ where that is wanted; gives what viewers are told.
+/// What viewers are told of a session over MoQ, and the task that publishes it.
+type Published = (MoqJson, tokio::task::JoinHandle<()>);
+
+/// Serves over MoQ where that is wanted.
 #[cfg(feature = "moq")]
 fn start_moq(
     args: &ServeArgs,
@@ -183,16 +195,21 @@ fn start_moq(
     runtime: &Runtime,
     first_group: u64,
     most: usize,
-) -> Result<Option<MoqJson>> {
+) -> Result<Option<Published>> {
     let scene = hub.host().scene().hash().0;
     let Some(moq) = moq::Moq::open(args, &scene, runtime)? else { return Ok(None) };
     let json = moq.json.clone();
-    moq.start(hub, runtime, first_group, most)?;
-    Ok(json)
+    Ok(Some((json, moq.start(hub, runtime, first_group, most)?)))
 }
 
 #[cfg(not(feature = "moq"))]
-fn start_moq(args: &ServeArgs, _: &hub::SharedHub, _: &Runtime, _: u64, _: usize) -> Result<Option<MoqJson>> {
+fn start_moq(
+    args: &ServeArgs,
+    _: &hub::SharedHub,
+    _: &Runtime,
+    _: u64,
+    _: usize,
+) -> Result<Option<Published>> {
     if args.moq.is_some() || !args.relay.is_empty() {
         bail!("--moq, --relay: this program was built without MoQ: cargo build --release --features moq");
     }
@@ -288,7 +305,7 @@ fn start(engine: Engine, threads: usize) -> Result<JoinHandle<Result<()>>> {
 }
 
 /// Says where what is to be found.
-fn announce(url: &str, asset: &Asset, has_page: bool, is_secure: bool, moq: Option<&MoqJson>) {
+fn announce(url: &str, asset: &Asset, has_page: bool, is_secure: bool, has_moq: bool) {
     say!("\n{} is lit here:", asset.title);
     if has_page {
         say!("  in a browser   {url}");
@@ -298,8 +315,8 @@ fn announce(url: &str, asset: &Asset, has_page: bool, is_secure: bool, moq: Opti
     if !is_secure {
         say!("  in a window    dapple view --url {url}");
     }
-    if let Some(moq) = moq {
-        say!("  over QUIC      dapple view --url {url} --moq        {} at {}", moq.name, moq.url);
+    if has_moq {
+        say!("  over QUIC      dapple view --url {url} --moq");
     }
     say!("  figures        {url}health  {url}metrics\nCtrl-C ends it\n");
 }
@@ -333,7 +350,12 @@ fn wait(runtime: &Runtime, hub: &Hub) -> Result<()> {
 }
 
 /// Tells viewers that it ends, and gives them time to hear it.
-fn drain(runtime: &Runtime, hub: &Hub, stop_accepting: &watch::Sender<bool>) {
+fn drain(
+    runtime: &Runtime,
+    hub: &Hub,
+    stop_accepting: &watch::Sender<bool>,
+    publishing: Option<tokio::task::JoinHandle<()>>,
+) {
     tracing::info!("ending");
     hub.set_phase(Phase::Draining);
     hub.host().close();
@@ -342,6 +364,10 @@ fn drain(runtime: &Runtime, hub: &Hub, stop_accepting: &watch::Sender<bool>) {
         while hub.host().counts().viewers > 0 && Instant::now() < until {
             hub.step_done();
             tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+        if let Some(publishing) = publishing {
+            hub.step_done();
+            let _ = tokio::time::timeout(LAST_WORDS, publishing).await;
         }
         // The last goodbyes are on their way.
         tokio::time::sleep(Duration::from_millis(50)).await;

@@ -4,17 +4,18 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 
 use anyhow::{Context, Result, anyhow};
-use dapple_moq::moq_net::{Patterns, cache, origin};
+use dapple_moq::moq_net::{cache, origin};
 use dapple_moq::{Arrivals, Broadcast, Names};
 use moq_tokio::server::Request;
 use tokio::runtime::Runtime;
 use tokio::sync::Semaphore;
+use tokio::task::JoinHandle;
 use url::Url;
 
 use super::hub::{Hub, SharedHub, Whence};
 use super::viewer::talk;
 use crate::args::ServeArgs;
-use crate::page::MoqJson;
+use crate::page::{HOST, MoqJson, VIEWER};
 use crate::transport::moq::{arrived, client};
 
 /// Most bytes that are kept: what this publishes for those who come late, and what viewers say until it was heard.
@@ -26,8 +27,8 @@ pub(crate) struct Moq {
     names: Names,
     server: Option<moq_tokio::Server>,
     relays: Vec<Url>,
-    /// What viewers are told; nothing where there is no way for them.
-    pub(crate) json: Option<MoqJson>,
+    /// What viewers are told.
+    pub(crate) json: MoqJson,
 }
 
 impl Moq {
@@ -45,38 +46,37 @@ impl Moq {
         let relays = args.relay.iter().map(|text| relay(text)).collect::<Result<Vec<Url>>>()?;
         let (server, own) = match args.moq {
             Some(port) => {
-                let (server, url, certificate) = listen(args, port)?;
-                (Some(server), Some((url, certificate)))
+                let (server, port, certificate) = listen(args, port)?;
+                let path = names.path_of(VIEWER);
+                (Some(server), Some((format!("https://{HOST}:{port}{path}"), certificate)))
             }
             None => (None, None),
         };
         let at = args.moq_at.clone().or_else(|| own.as_ref().map(|(url, _)| url.clone()));
-        let json = at.or_else(|| relays.first().map(without_token)).map(|url| MoqJson {
-            // That of another address is its own.
-            certificate: own.filter(|(own, _)| *own == url).and_then(|(_, certificate)| certificate),
-            url,
-            name,
-        });
+        let at = at.or_else(|| relays.first().map(without_token));
+        let url = at.context("there is neither a port nor a relay")?;
+        // That of another address is its own.
+        let certificate = own.filter(|(own, _)| *own == url).and_then(|(_, certificate)| certificate);
+        let json = MoqJson { url, name, certificate };
         let mut config = origin::Config::default();
         let kept = cache::Config::default().with_capacity(CACHE_BYTES).with_expiry(cache::DEFAULT_EXPIRY);
         config.pool = cache::Pool::new(kept);
         Ok(Some(Moq { origin: moq_tokio::origin::spawn_config(config), names, server, relays, json }))
     }
 
-    /// Publishes until the hub ends; `most` viewers are heard, and as many connections taken.
+    /// Publishes until the hub ends; `most` viewers are heard, and as many connections taken. The task ends once the host has said that it does.
     pub(crate) fn start(
         self,
         hub: &SharedHub,
         runtime: &Runtime,
         first_group: u64,
         most: usize,
-    ) -> Result<()> {
+    ) -> Result<JoinHandle<()>> {
         let _guard = runtime.enter();
         let Moq { origin, names, server, relays, .. } = self;
         let broadcast =
             Broadcast::new(&origin, &names, &hub.host(), first_group).context("cannot publish over MoQ")?;
-        let (readable, writable) = (names.readable()?, names.writable()?);
-        let ways = Ways { origin: origin.clone(), readable, writable };
+        let ways = Ways { origin: origin.clone(), names: names.clone() };
         for url in relays {
             tokio::spawn(ways.clone().relay(url));
         }
@@ -85,8 +85,7 @@ impl Moq {
         }
         let arrivals = Arrivals::new(&origin, &names, most)?;
         tokio::spawn(hear(hub.clone(), arrivals));
-        tokio::spawn(publish(hub.clone(), broadcast, origin));
-        Ok(())
+        Ok(tokio::spawn(publish(hub.clone(), broadcast, origin)))
     }
 }
 
@@ -114,8 +113,8 @@ fn without_token(url: &Url) -> String {
     url.to_string()
 }
 
-/// The server, its address and the hash of its certificate where nobody else vouches for it.
-fn listen(args: &ServeArgs, port: u16) -> Result<(moq_tokio::Server, String, Option<String>)> {
+/// The server, its port and the hash of its certificate where nobody else vouches for it.
+fn listen(args: &ServeArgs, port: u16) -> Result<(moq_tokio::Server, u16, Option<String>)> {
     let mut config = moq_tokio::listen::Config::default();
     let addresses = std::net::ToSocketAddrs::to_socket_addrs(&(args.host.as_str(), port));
     let address: SocketAddr = addresses
@@ -142,15 +141,14 @@ fn listen(args: &ServeArgs, port: u16) -> Result<(moq_tokio::Server, String, Opt
         .with_context(|| format!("cannot listen on UDP port {port} of {} (--moq)", args.host))?;
     let local = server.local_addr().context("the QUIC listener has no address")?;
     let certificate = is_own.then(|| server.certificates().fingerprints().into_iter().next()).flatten();
-    Ok((server, crate::listen::url_of(local, "https"), certificate))
+    Ok((server, local.port(), certificate))
 }
 
 /// By which ways what is published goes, and how much of it is seen there.
 #[derive(Clone)]
 struct Ways {
     origin: origin::Producer,
-    readable: Patterns,
-    writable: Patterns,
+    names: Names,
 }
 
 impl Ways {
@@ -159,12 +157,8 @@ impl Ways {
         let shown = without_token(&url);
         let connecting = || {
             let client = client(None)?;
-            let readable = self.origin.consume().scope("", &self.readable);
-            let writable = self.origin.scope("", &self.writable);
-            let (readable, writable) = readable
-                .and_then(|readable| Ok((readable, writable?)))
-                .map_err(|error| crate::transport::LinkError::Refused(error.to_string()))?;
-            Ok::<_, crate::transport::LinkError>(
+            let (readable, writable) = self.scopes("*")?;
+            Ok::<_, anyhow::Error>(
                 client.with_publisher(readable).with_subscriber(writable).connect(url.clone()),
             )
         };
@@ -212,9 +206,17 @@ impl Ways {
         }
     }
 
+    /// What a viewer (`*` for all of a relay's) sees of what is published, and where it may write.
+    fn scopes(&self, viewer: &str) -> Result<(origin::Consumer, origin::Producer)> {
+        let (readable, writable) = self.names.rights(viewer)?;
+        Ok((self.origin.consume().scope("", &readable)?, self.origin.scope("", &writable)?))
+    }
+
     async fn serve(self, request: Request) -> Result<()> {
-        let readable = self.origin.consume().scope("", &self.readable)?;
-        let writable = self.origin.scope("", &self.writable)?;
+        let viewer = self.names.viewer_at(request.path()).map(str::to_owned);
+        // Whoever does not know the name learns nothing. Dropped, it is closed.
+        let viewer = viewer.context("it connects at no viewer's path")?;
+        let (readable, writable) = self.scopes(&viewer)?;
         let session = request.with_publisher(readable).with_subscriber(writable).ok().await?;
         let _ = session.closed().await;
         Ok(())

@@ -20,7 +20,7 @@ use super::asset::Asset;
 use super::hub::{Phase, SharedHub, Whence};
 use super::viewer::talk;
 use super::work::{self, WorkHub};
-use crate::page::{FILE_NAME, MoqJson, Spares, ViewerJson};
+use crate::page::{FILE_NAME, HOST, MoqJson, Spares, ViewerJson};
 use crate::transport::ws;
 
 /// Where viewers connect to.
@@ -111,8 +111,10 @@ async fn viewer_json_answer(State(shared): State<Shared>, asked: HeaderMap) -> R
         (header::VARY, "origin"),
     ];
     let ViewerJsons { open, own } = &shared.viewer_json;
-    let json = if is_foreign(&asked) { open } else { own };
-    (headers, json.to_string()).into_response()
+    if is_foreign(&asked) {
+        return (headers, open.to_string()).into_response();
+    }
+    (headers, own.replace(HOST, &host_name(&asked))).into_response()
 }
 
 /// The scene under the name of its content: who has it need never ask again.
@@ -146,6 +148,17 @@ fn is_foreign(headers: &HeaderMap) -> bool {
     let origin = origin.as_bytes();
     let own = origin.strip_prefix(b"http://").or(origin.strip_prefix(b"https://"));
     own != Some(host)
+}
+
+/// The name under which this server was reached, without a port.
+fn host_name(headers: &HeaderMap) -> String {
+    let host = headers.get(header::HOST).and_then(|host| host.to_str().ok()).unwrap_or_default();
+    let name = match host.rsplit_once(':') {
+        Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,
+        _ => host,
+    };
+    let is_good = |byte: u8| byte.is_ascii_alphanumeric() || b".-:[]".contains(&byte);
+    if name.is_empty() || !name.bytes().all(is_good) { "127.0.0.1".to_owned() } else { name.to_owned() }
 }
 
 async fn live_answer(

@@ -10,7 +10,7 @@ use moq_tokio::{Client, Connection};
 use url::Url;
 
 use super::{Inbound, LinkError, Message, Outbound};
-use crate::page::MoqJson;
+use crate::page::{MoqJson, VIEWER};
 
 /// How long a host may take to answer at all: the connection, and what it says of itself.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
@@ -38,10 +38,6 @@ pub(crate) fn client(certificate: Option<&str>) -> Result<Client, LinkError> {
 
 /// Connects to a host, or to a relay that has it.
 pub(crate) async fn connect(address: &MoqJson, hello: &Hello) -> Result<(ClientOut, ClientIn), LinkError> {
-    let url: Url = address
-        .url
-        .parse()
-        .map_err(|error| LinkError::Refused(format!("{} is no address: {error}", address.url)))?;
     let names = Names::new(&address.name).map_err(from)?;
     let mut secret = [0; 16];
     getrandom::fill(&mut secret)
@@ -51,6 +47,9 @@ pub(crate) async fn connect(address: &MoqJson, hello: &Hello) -> Result<(ClientO
         bits_per_s: hello.bits_per_s,
         viewer: dapple_session::host::hex(&secret),
     };
+    let url = address.url.replace(VIEWER, &wish.viewer);
+    let url: Url =
+        url.parse().map_err(|error| LinkError::Refused(format!("{url} is no address: {error}")))?;
     let (from_host, to_host) = (moq_tokio::origin::spawn(), moq_tokio::origin::spawn());
     let client = client(address.certificate.as_deref())?
         .with_reconnect(false)

@@ -74,6 +74,8 @@ impl Remote {
                 _ => {}
             };
             runtime.block_on(keep(&address, &thread_shared, &state_sender, stopped, on_news));
+            // What it still asks of others is not waited for.
+            runtime.shutdown_background();
         };
         let thread = std::thread::Builder::new()
             .name("receive".to_owned())

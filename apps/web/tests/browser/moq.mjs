@@ -58,7 +58,7 @@ async function run() {
 
   // UDP that leads nowhere: the page's own way is taken.
   const walled = await open("walled", `${plan.url}?${COARSE}`, (json) => {
-    json.moq.url = `https://127.0.0.1:${plan.port}/`;
+    json.moq.url = `https://127.0.0.1:${plan.port}/{viewer}`;
     return json;
   });
   await isLive(walled);
