@@ -46,6 +46,10 @@ impl BentNormal {
     /// The unit vector. Every bit pattern gives one.
     pub fn unpack(self, normal: PackedNormal) -> Vec3 {
         let normal = normal.unpack();
+        if self == BentNormal::UNBENT {
+            // Just that, without rounding.
+            return normal;
+        }
         let (tangent, bitangent) = orthonormal_basis(normal);
         let [x, y] = self.0.map(|byte| (f32::from(byte) - 128.0) / 127.0);
         let z = (1.0 - x * x - y * y).max(0.0).sqrt();
