@@ -5,8 +5,8 @@ use std::sync::Arc;
 use dapple_stream::{Limits, Subscriber};
 
 use super::drill::{Drill, moved};
-use crate::host::{Arrival, HostConfig, LightGroups, Piece, StateGroups};
-use crate::{Guest, GuestConfig, GuestError, Held, News};
+use crate::host::{Arrival, HostConfig, LightGroups, Next, Outgoing, Piece, StateGroups};
+use crate::{FromViewer, Guest, GuestConfig, GuestError, Held, News};
 
 /// One group as a relay keeps it.
 #[derive(Default)]
@@ -206,4 +206,51 @@ fn an_observer_is_no_viewer_and_never_silent() {
     let last = written.texts.last().unwrap().last().unwrap().clone();
     let mut guest = Guest::new(drill.scene.clone(), GuestConfig::default());
     assert!(matches!(guest.receive_text(&last), Err(GuestError::Refused(_))), "{last}");
+}
+
+#[test]
+fn an_event_that_was_lost_with_its_connection_comes_once_where_state_is_shared() {
+    let mut drill = Drill::new(100, HostConfig::default(), 4);
+    let mut guest = Guest::new(drill.scene.clone(), GuestConfig::default());
+    let said = |guest: &mut Guest, now_us: u64| {
+        std::iter::from_fn(|| guest.next(now_us))
+            .map(|text| FromViewer::parse(&text).unwrap())
+            .collect::<Vec<_>>()
+    };
+    let is_event = |message: &FromViewer| matches!(message, FromViewer::Event { .. });
+    for connection in 0..2 {
+        let now_us = drill.host_us();
+        guest.connected(now_us);
+        let hello = said(&mut guest, now_us).remove(0);
+        let FromViewer::Hello(hello) = hello else { panic!("{hello:?}") };
+        // What all are told comes first, and says nothing of this viewer's events.
+        let observer = drill.host.observe(arrival(), now_us);
+        let Next::Send(Outgoing::Text(welcome)) = drill.host.next(observer, now_us) else { panic!() };
+        assert_eq!(guest.receive_text(&welcome).unwrap(), News::Welcome(false));
+        assert!(!said(&mut guest, now_us).iter().any(is_event), "before the host knows who says it");
+        let key = format!("key {connection}");
+        let link = drill.host.join(&hello, Arrival { key, ..arrival() }, now_us).unwrap();
+        let Next::Send(Outgoing::Text(welcome)) = drill.host.next(link, now_us) else { panic!() };
+        assert_eq!(guest.receive_text(&welcome).unwrap(), News::Welcome(true));
+        if connection == 0 {
+            // One that is answered, so that numbers go on from there, and one that is lost.
+            assert!(guest.send(moved(1.0)));
+        }
+        for message in said(&mut guest, now_us) {
+            drill.host.hear(link, Ok(message), now_us).unwrap();
+        }
+        drill.step();
+        while let Next::Send(Outgoing::Text(text)) = drill.host.next(link, drill.host_us()) {
+            guest.receive_text(&text).unwrap();
+        }
+        if connection == 0 {
+            assert!(!guest.has_pending());
+            assert!(guest.send(moved(2.0)));
+            assert!(said(&mut guest, drill.host_us()).iter().any(is_event));
+            drill.host.leave(link, drill.host_us());
+            guest.disconnected();
+        }
+    }
+    assert!(!guest.has_pending(), "it was answered");
+    assert_eq!((drill.host.counts().events, drill.host.counts().resumed), (2, 1));
 }
