@@ -50,12 +50,10 @@ impl About {
         serde_json::to_string(self).expect("numbers and texts are JSON")
     }
 
-    /// The richest stream within a wish, or else the leanest.
-    /// Its number.
+    /// The number of the stream for a wish of most bits a second.
     pub fn stream_for(&self, bits_per_s: Option<u64>) -> usize {
-        let Some(wish) = bits_per_s else { return 0 };
-        let within = |stream: &Stream| stream.bits_per_s.is_some_and(|bits| bits <= wish);
-        self.streams.iter().position(within).unwrap_or(self.streams.len() - 1)
+        let budgets: Vec<Option<u64>> = self.streams.iter().map(|stream| stream.bits_per_s).collect();
+        dapple_session::stream_within(&budgets, bits_per_s)
     }
 }
 

@@ -3,7 +3,10 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use dapple_session::{FromHost, FromViewer, MAX_FROM_HOST_BYTES, MAX_LIGHT_MESSAGE_BYTES, Reason, Refusal};
+use dapple_session::{
+    FromHost, FromViewer, MAX_FROM_HOST_BYTES, MAX_LIGHT_MESSAGE_BYTES, PROTOCOL, Reason, Refusal, Terms,
+    WIRE,
+};
 use futures_channel::oneshot;
 use futures_util::future::{Either, select, try_join};
 use moq_net::{Timestamp, broadcast, group, origin, track};
@@ -56,36 +59,18 @@ pub async fn join(
         broadcast: own,
     };
     out.broadcast.announce(origin::Route::default())?;
+    let host = Terms { protocol: about.protocol, wire: about.wire, scene: &about.scene };
+    let viewer = Terms { protocol: PROTOCOL, wire: WIRE, scene: &wish.scene };
     let reading = Reader {
         from: from.clone(),
         to_viewer: names.to_viewer(&wish.viewer),
-        refusal: refusal(&about, wish),
+        // Said as the host would, to those too who do not ask it.
+        refusal: viewer.refusal(host),
         rung: about.stream_for(wish.bits_per_s),
         shared,
         lost: out.lost.clone(),
     };
     Ok((out, ViewerIn(Pump::new(|messages| Box::pin(reading.run(messages))))))
-}
-
-/// What makes it of no use to go on, said as the host would.
-fn refusal(about: &About, wish: &Wish) -> Option<Refusal> {
-    let (protocol, wire) = (dapple_session::PROTOCOL, dapple_session::WIRE);
-    if about.protocol != protocol || about.wire != wire {
-        let message = format!(
-            "the host speaks protocol {} with frames of version {}, this viewer {protocol} and {wire}: reload the page, or use a viewer of \
-             the host's own version",
-            about.protocol, about.wire
-        );
-        return Some(Refusal { reason: Reason::Version, message });
-    }
-    if !about.scene.eq_ignore_ascii_case(&wish.scene) {
-        let message = format!(
-            "the viewer has loaded scene {:.16}, this host lights {:.16}: fetch the scene anew",
-            wish.scene, about.scene
-        );
-        return Some(Refusal { reason: Reason::Scene, message });
-    }
-    None
 }
 
 /// Says what a viewer has to say.

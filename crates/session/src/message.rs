@@ -354,6 +354,47 @@ impl Refusal {
     }
 }
 
+/// What both ends must agree on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Terms<'a> {
+    /// Version of the conversation.
+    pub protocol: u32,
+    /// Version of the frames of light.
+    pub wire: u8,
+    /// The scene's hash, 64 hexadecimal digits.
+    pub scene: &'a str,
+}
+
+impl Terms<'_> {
+    /// Why a viewer with these terms cannot be one of a host with those; `None` where it can.
+    pub fn refusal(self, host: Terms<'_>) -> Option<Refusal> {
+        if (self.protocol, self.wire) != (host.protocol, host.wire) {
+            let message = format!(
+                "the viewer speaks protocol {} with frames of version {}, the host {} and {}: reload the page, or use a viewer of the host's \
+                 own version",
+                self.protocol, self.wire, host.protocol, host.wire
+            );
+            return Some(Refusal::new(Reason::Version, message));
+        }
+        if !self.scene.eq_ignore_ascii_case(host.scene) {
+            let message = format!(
+                "the viewer has loaded scene {:.16}, the host lights {:.16}: fetch the scene anew",
+                self.scene, host.scene
+            );
+            return Some(Refusal::new(Reason::Scene, message));
+        }
+        None
+    }
+}
+
+/// Which of several streams a viewer gets, of those that have budgets of so many bits a second (`None` for none), from the richest to the leanest: the
+/// richest within its wish, or else the leanest.
+pub fn stream_within(bits_per_s: &[Option<u64>], wish: Option<u64>) -> usize {
+    let Some(wish) = wish else { return 0 };
+    let within = |bits: &Option<u64>| bits.is_some_and(|bits| bits <= wish);
+    bits_per_s.iter().position(within).unwrap_or(bits_per_s.len().saturating_sub(1))
+}
+
 /// Kinds of refusals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

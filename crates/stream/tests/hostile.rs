@@ -123,6 +123,23 @@ fn receive(subscriber: &mut Subscriber, bytes: &[u8]) -> Result<Applied, Receive
     result
 }
 
+/// A payload with other bytes here and there, half of them in its headers (so many bytes at the front), and cut off.
+fn damaged(
+    mut bytes: Vec<u8>,
+    headers: usize,
+    edits: &[(prop::sample::Index, u8)],
+    cut: Option<prop::sample::Index>,
+) -> Vec<u8> {
+    for (at, value) in edits {
+        let range = if value % 2 == 0 { bytes.len() } else { bytes.len().min(headers) };
+        bytes[at.index(range)] = *value;
+    }
+    if let Some(cut) = cut {
+        bytes.truncate(cut.index(bytes.len()));
+    }
+    bytes
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
@@ -151,16 +168,7 @@ proptest! {
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
         cut in prop::option::weighted(0.2, any::<prop::sample::Index>()),
     ) {
-        let mut bytes = payload(if delta { &SAMPLE.2 } else { &SAMPLE.1 });
-        for (at, value) in &edits {
-            // Headers lie at the front, where half of the edits go.
-            let range = if value % 2 == 0 { bytes.len() } else { bytes.len().min(300) };
-            let at = at.index(range);
-            bytes[at] = *value;
-        }
-        if let Some(cut) = cut {
-            bytes.truncate(cut.index(bytes.len()));
-        }
+        let bytes = damaged(payload(if delta { &SAMPLE.2 } else { &SAMPLE.1 }), 300, &edits, cut);
         let kind = if delta { FrameKind::Delta } else { FrameKind::Snapshot };
         let frame = seal(kind, 0, 12, &bytes);
         let mut subscriber = if delta { holding() } else { Subscriber::new(None, Limits::default()) };
@@ -173,15 +181,7 @@ proptest! {
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
         cut in prop::option::weighted(0.2, any::<prop::sample::Index>()),
     ) {
-        let mut bytes = payload(&BENT[which]);
-        for (at, value) in &edits {
-            let range = if value % 2 == 0 { bytes.len() } else { bytes.len().min(80) };
-            let at = at.index(range);
-            bytes[at] = *value;
-        }
-        if let Some(cut) = cut {
-            bytes.truncate(cut.index(bytes.len()));
-        }
+        let bytes = damaged(payload(&BENT[which]), 80, &edits, cut);
         let kind = [FrameKind::Snapshot, FrameKind::Delta, FrameKind::Sets][which];
         let _ = receive(&mut bent(which), &seal(kind, 0, which as u64, &bytes));
         // To who has none they are something else.

@@ -93,12 +93,11 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
         Some(path) => Some(LiveRecording::create(path, asset.scene.hash().0, &asset.scene.name)?),
         None => None,
     };
-    let tokens = args.token.iter().map(|token| (token.secret.clone(), token.role)).collect();
     let host_config = HostConfig {
         hz,
         max_viewers: args.max_viewers,
         events_per_s: args.max_events,
-        access: Access::new(tokens),
+        access: access(args),
         rungs: rungs(config.bits_per_s, args),
         playing: !args.paused,
         ..HostConfig::default()
@@ -136,12 +135,6 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     };
     let (stop_accepting, stop) = watch::channel(false);
     let most = args.max_viewers as usize + OTHER_CONNECTIONS;
-    if args.moq.is_some() && access.open_role().is_none() {
-        bail!(
-            "--moq: over QUIC whoever knows the session's name may look, without a token. Leave out --moq or --token view=…, or publish to a \
-             --relay that asks for tokens itself"
-        );
-    }
     let (moq, publishing) = start_moq(args, &hub, &runtime, first_group, most)?.unzip();
     let router = web::router(hub.clone(), asset.clone(), work, page, moq);
     raise_file_limit(most as u64 + 64);
@@ -220,6 +213,12 @@ fn check(args: &ServeArgs) -> Result<()> {
     if args.moq.is_none() && args.relay.is_empty() && (args.moq_name.is_some() || args.moq_at.is_some()) {
         bail!("--moq-name and --moq-at say where a session is over MoQ: it needs --moq or --relay too");
     }
+    if args.moq.is_some() && access(args).open_role().is_none() {
+        bail!(
+            "--moq: over QUIC whoever knows the session's name may look, without a token. Leave out --moq or --token view=…, or publish to a \
+             --relay that asks for tokens itself"
+        );
+    }
     if !(args.load > 0.0 && args.load <= 1.0) {
         bail!("--load is {}, must be above 0 to 1", args.load);
     }
@@ -264,6 +263,11 @@ fn check(args: &ServeArgs) -> Result<()> {
         check_writable(path).context("--record")?;
     }
     Ok(())
+}
+
+/// Who may do what.
+fn access(args: &ServeArgs) -> Access {
+    Access::new(args.token.iter().map(|token| (token.secret.clone(), token.role)).collect())
 }
 
 /// What workers are told.

@@ -10,8 +10,8 @@ import { readFile, writeFile } from "node:fs/promises";
 import { join } from "node:path";
 
 import { launch } from "./launch.mjs";
+import { isLive, open as openPage, until } from "./pages.mjs";
 
-const PATIENCE_MS = 150_000;
 // Time of the scene at which things are moved, seconds: boulders lie in view.
 const TIME = 14.6;
 const COARSE = "shadowResolution=128&samples=1&maxPixelRatio=0.5&fade=0";
@@ -201,33 +201,9 @@ function stop() {
   return ended;
 }
 
-async function open(name, url, { width, height, phone }) {
-  const context = await browser.newContext({
-    viewport: { width, height },
-    deviceScaleFactor: 1,
-    hasTouch: Boolean(phone),
-    colorScheme: "dark",
-  });
-  const tab = await context.newPage();
+function open(name, url, options) {
   // That a server is not there is said by the browser itself.
-  const expected = /WebSocket connection to|ERR_CONNECTION/;
-  tab.on("console", (line) => {
-    if (line.type() === "error" && !expected.test(line.text())) facts.errors.push(`${name}: ${line.text()}`);
-  });
-  tab.on("pageerror", (error) => facts.errors.push(`${name}: ${error.message}`));
-  await tab.goto(url);
-  await until(tab, () => globalThis.dapple || !document.getElementById("message").hidden);
-  if (await tab.isVisible("#message")) throw new Error(`${name}: ${await tab.innerText("#message")}`);
-  return tab;
-}
-
-function until(tab, what, argument) {
-  return tab.waitForFunction(what, argument, { timeout: PATIENCE_MS, polling: 100 });
-}
-
-async function isLive(tab) {
-  await until(tab, () => globalThis.dapple?.live?.state === "live" && dapple.live.hasLight);
-  await tab.evaluate(() => dapple.ready);
+  return openPage(browser, facts.errors, name, url, { expected: /WebSocket connection to|ERR_CONNECTION/, ...options });
 }
 
 // Figures are renewed twice a second.

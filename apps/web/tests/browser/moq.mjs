@@ -8,8 +8,8 @@ import { readFile } from "node:fs/promises";
 import { join } from "node:path";
 
 import { launch } from "./launch.mjs";
+import { isLive, open as openPage, until } from "./pages.mjs";
 
-const PATIENCE_MS = 120_000;
 const COARSE = "shadowResolution=128&samples=1&maxPixelRatio=0.5&fade=0";
 
 const plan = JSON.parse(await readFile(process.argv[2], "utf8"));
@@ -74,31 +74,8 @@ async function run() {
   facts.relayed = await relayed.evaluate(() => [dapple.live.transport, dapple.stats.points]);
 }
 
-async function open(name, url, change) {
-  const context = await browser.newContext({ viewport: { width: 960, height: 540 }, deviceScaleFactor: 1 });
-  const tab = await context.newPage();
-  if (change) {
-    await tab.route("**/viewer.json", async (route) => {
-      const response = await route.fetch();
-      await route.fulfill({ response, json: change(await response.json()) });
-    });
-  }
+function open(name, url, change) {
   // That a connection cannot be made is said by the browser itself.
-  const expected = /WebTransport|QUIC|ERR_CONNECTION/;
-  tab.on("console", (line) => {
-    if (line.type() === "error" && !expected.test(line.text())) facts.errors.push(`${name}: ${line.text()}`);
-  });
-  tab.on("pageerror", (error) => facts.errors.push(`${name}: ${error.message}`));
-  await tab.goto(url);
-  await until(tab, () => globalThis.dapple || !document.getElementById("message").hidden);
-  if (await tab.isVisible("#message")) throw new Error(`${name}: ${await tab.innerText("#message")}`);
-  return tab;
-}
-
-async function isLive(tab) {
-  await until(tab, () => globalThis.dapple?.live?.state === "live" && dapple.live.hasLight);
-}
-
-function until(tab, what, argument) {
-  return tab.waitForFunction(what, argument, { timeout: PATIENCE_MS, polling: 100 });
+  const options = { width: 960, height: 540, expected: /WebTransport|QUIC|ERR_CONNECTION/, change };
+  return openPage(browser, facts.errors, name, url, options);
 }

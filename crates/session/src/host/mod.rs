@@ -26,7 +26,8 @@ pub use types::{Arrival, HostConfig, HostCounts, Link, Next, Outgoing, Shared, S
 use viewer::Viewer;
 
 use crate::{
-    Event, FromHost, FromViewer, Held, Hello, LookCamera, PROTOCOL, Reason, Refusal, Role, SceneClock,
+    Event, FromHost, FromViewer, Held, Hello, LookCamera, PROTOCOL, Reason, Refusal, Role, SceneClock, Terms,
+    WIRE, stream_within,
 };
 
 /// Most ages kept between two questions.
@@ -116,25 +117,10 @@ impl Host {
         if let Some(refusal) = &self.closing {
             return Err(refusal.clone());
         }
-        let wire = dapple_stream::codec::VERSION;
-        if hello.protocol != PROTOCOL || hello.wire != wire {
-            return Err(Refusal::new(
-                Reason::Version,
-                format!(
-                    "the viewer speaks protocol {} with frames of version {}, this host {PROTOCOL} and {wire}: reload the page, or \
-                     use a viewer of the host's own version",
-                    hello.protocol, hello.wire
-                ),
-            ));
-        }
-        if !hello.scene.eq_ignore_ascii_case(&self.scene_hash) {
-            return Err(Refusal::new(
-                Reason::Scene,
-                format!(
-                    "the viewer has loaded scene {:.16}, this host lights {:.16}: fetch the scene anew",
-                    hello.scene, self.scene_hash
-                ),
-            ));
+        let host = Terms { protocol: PROTOCOL, wire: WIRE, scene: &self.scene_hash };
+        let viewer = Terms { protocol: hello.protocol, wire: hello.wire, scene: &hello.scene };
+        if let Some(refusal) = viewer.refusal(host) {
+            return Err(refusal);
         }
         let role = self.config.access.role(hello.token.as_deref(), arrival.is_foreign)?;
         let known = hello.key.as_deref().and_then(|key| {
@@ -157,7 +143,7 @@ impl Host {
                 id
             }
         };
-        let rung = self.rung_for(hello.bits_per_s);
+        let rung = stream_within(&self.config.rungs, hello.bits_per_s);
         let is_same = known.is_some_and(|id| self.viewers[&id].rung == rung);
         // Light of another stream, or of another host, has epochs of its own. What is shared goes on whoever comes.
         let goes_on = is_same || arrival.shares;
@@ -185,13 +171,6 @@ impl Host {
         };
         self.viewers.remove(&id);
         Ok(())
-    }
-
-    /// The richest stream within a wish.
-    fn rung_for(&self, bits_per_s: Option<u64>) -> usize {
-        let Some(wish) = bits_per_s else { return 0 };
-        let within = |bits: &Option<u64>| bits.is_some_and(|bits| bits <= wish);
-        self.config.rungs.iter().position(within).unwrap_or(self.config.rungs.len() - 1)
     }
 
     /// Takes a text of a viewer: [`Host::announce`], reading and [`Host::hear`] in one.
