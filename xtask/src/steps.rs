@@ -113,6 +113,9 @@ impl Runner {
             Step::ThinClient => self.cargo(&[
                 "clippy",
                 "--package=dapple-client",
+                // What viewers speak, without the server's end.
+                "--package=dapple-session",
+                "--lib",
                 "--no-default-features",
                 "--",
                 "--deny=warnings",

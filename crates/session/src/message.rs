@@ -347,7 +347,6 @@ pub struct Refusal {
     pub message: String,
 }
 
-#[cfg(feature = "host")]
 impl Refusal {
     pub(crate) fn new(reason: Reason, message: impl Into<String>) -> Refusal {
         Refusal { reason, message: message.into() }
