@@ -50,6 +50,8 @@ pub(crate) struct MoqPlace {
     pub(crate) folder: String,
     /// The relay that is used instead of what it says.
     pub(crate) relay: Option<String>,
+    /// Whether the viewer takes the light in parts where it comes in some.
+    pub(crate) in_parts: bool,
 }
 
 impl Address {
@@ -66,7 +68,17 @@ impl Address {
         }
         let json = moq.context("--moq: what is served there is not served over MoQ (dapple serve --moq)")?;
         let relay = (!relay.is_empty()).then(|| relay.to_owned());
-        Ok(Some(Address::Moq(MoqPlace { json, folder: folder.to_owned(), relay }.by_relay())))
+        Ok(Some(Address::Moq(
+            MoqPlace { json, folder: folder.to_owned(), relay, in_parts: false }.by_relay(),
+        )))
+    }
+
+    /// The same for a viewer that can take the light in parts ([`News::Light`]), and says what it sees.
+    pub(crate) fn in_parts(self) -> Address {
+        match self {
+            Address::Moq(place) => Address::Moq(MoqPlace { in_parts: true, ..place }),
+            Address::Ws(_) => self,
+        }
     }
 
     /// The same after the connection has broken.
@@ -189,7 +201,7 @@ async fn converse(
         #[cfg(feature = "moq")]
         Address::Moq(place) => {
             let hello = shared.lock().hello();
-            let connecting = moq::connect(&place.json, &hello);
+            let connecting = moq::connect(&place.json, &hello, place.in_parts);
             converse_over(connecting, shared, state, stop, on_news).await
         }
         #[cfg(not(feature = "moq"))]

@@ -232,6 +232,7 @@ fn light(
         let frame = if round == asked.round { report.frame } else { server.join()? };
         round = asked.round;
         let head = LightHead {
+            part: None,
             stamp_us: step.stamp_us,
             made_us: step.stamp_us + took.as_micros() as u64,
             scene_us: step.scene_us,

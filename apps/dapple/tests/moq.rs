@@ -135,7 +135,7 @@ impl MoqViewer {
             }
         };
         match news {
-            Ok(News::Light(frame)) if !frame.is_empty() => {
+            Ok(News::Light { frame, .. }) if !frame.is_empty() => {
                 let applied = self.subscriber.receive(&frame);
                 self.snapshots += u32::from(matches!(applied, Ok(Applied::NewLayout)));
                 let held = self.subscriber.group().zip(self.subscriber.epoch());

@@ -45,7 +45,7 @@ impl MoqLink {
     ) -> MoqLink {
         console_error_panic_hook::set_once();
         let (words, said) = mpsc::unbounded();
-        let wish = Wish { scene, viewer, bits_per_s: bits_per_s.map(|bits| bits as u64) };
+        let wish = Wish { scene, viewer, bits_per_s: bits_per_s.map(|bits| bits as u64), parts: true };
         spawn_local(async move {
             let ended =
                 converse(&url, &name, certificate.as_deref(), &wish, said, &on_open, &on_message).await;

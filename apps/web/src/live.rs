@@ -87,7 +87,7 @@ impl Core {
                 Some("state".to_owned())
             }
             News::Rejected(message) => Some(format!("rejected: {message}")),
-            News::Nothing | News::Light(_) => None,
+            News::Nothing | News::Light { .. } => None,
         })
     }
 
@@ -97,14 +97,14 @@ impl Core {
         let (Some(live), Some(shown)) = (&mut self.live, &mut self.shown) else { return Ok(false) };
         self.bytes.add(now_s, bytes.len() as f64);
         let news = live.guest.receive_bytes(bytes, micros(now_s)).map_err(|error| ended(&error))?;
-        let News::Light(frame) = news else { return Ok(false) };
+        let News::Light { part, frame } = news else { return Ok(false) };
         live.hears_light = true;
         let held = |held: Option<(u64, u64)>| held.map(|(group, epoch)| Held { group, epoch });
         if frame.is_empty() {
             live.guest.applied(held(shown.viewer.held()), true);
             return Ok(false);
         }
-        match shown.viewer.receive(&frame, now_s) {
+        match shown.viewer.receive_part(part, &frame, now_s) {
             Ok(applied) => {
                 live.guest.applied(held(shown.viewer.held()), true);
                 live.has_light = true;
@@ -118,7 +118,7 @@ impl Core {
             }
             Err(error) => {
                 let reason = match error {
-                    ReceiveError::WrongScene { .. } => Reason::Scene,
+                    ReceiveError::WrongScene { .. } | ReceiveError::Misfit(_) => Reason::Scene,
                     _ => Reason::Malformed,
                 };
                 Err(failure(reason, false, &error.to_string()))

@@ -21,6 +21,13 @@ pub struct About {
     pub scene: String,
     /// Streams of the same light, from the richest to the leanest: stream K is in `light/K` and `snapshot/K`.
     pub streams: Vec<Stream>,
+    /// Parts that the richest can be had in: part K is in `part/K` and `part-snapshot/K`. 0 where it comes as one.
+    #[serde(skip_serializing_if = "is_zero", default)]
+    pub parts: usize,
+}
+
+fn is_zero(number: &usize) -> bool {
+    *number == 0
 }
 
 /// A stream of light.
@@ -41,6 +48,9 @@ impl About {
             .map_err(|error| LinkError::Refused(format!("what the host says of itself: {error}")))?;
         if about.streams.is_empty() || about.streams.len() > MAX_STREAMS {
             return Err(LinkError::Refused(format!("the host offers {} streams", about.streams.len())));
+        }
+        if about.parts > dapple_session::MAX_PARTS {
+            return Err(LinkError::Refused(format!("the host offers {} parts", about.parts)));
         }
         Ok(about)
     }
@@ -63,7 +73,7 @@ mod tests {
 
     fn about(streams: &[Option<u64>]) -> About {
         let streams = streams.iter().map(|bits_per_s| Stream { bits_per_s: *bits_per_s }).collect();
-        About { protocol: 1, wire: 4, scene: "00".repeat(32), streams }
+        About { protocol: 1, wire: 4, scene: "00".repeat(32), streams, parts: 0 }
     }
 
     #[test]
@@ -73,6 +83,9 @@ mod tests {
         assert!(About::parse(&about(&[]).to_text()).is_err());
         assert!(About::parse(&about(&[None; 9]).to_text()).is_err());
         assert!(About::parse("{}").is_err());
+        let in_parts = About { parts: 3, ..said.clone() };
+        assert_eq!(About::parse(&in_parts.to_text()).unwrap(), in_parts);
+        assert!(About::parse(&About { parts: 257, ..said }.to_text()).is_err());
     }
 
     #[test]

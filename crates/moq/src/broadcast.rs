@@ -6,7 +6,7 @@ use bytes::Bytes;
 use dapple_session::host::{Arrival, Host, LightGroups, Piece, StateGroups};
 use moq_net::{Timestamp, broadcast, group, origin, track};
 
-use crate::names::{ABOUT, STATE, light, snapshot};
+use crate::names::{ABOUT, STATE, light, part, part_snapshot, snapshot};
 use crate::{About, LinkError, Names, Stream};
 
 /// For so long groups are kept that are not the newest: who has just begun to take one may end it.
@@ -72,6 +72,7 @@ impl Broadcast {
                 .iter()
                 .map(|bits_per_s| Stream { bits_per_s: *bits_per_s })
                 .collect(),
+            parts: host.config().parts.len(),
         };
         let broadcast = origin.create_broadcast(names.shared())?;
         let track = |name: &str| {
@@ -83,12 +84,16 @@ impl Broadcast {
         group.write_frame(Timestamp::now(), about.to_text())?;
         group.finish()?;
         let state = Groups::new(track(STATE)?, first_group, false);
-        let streams = (0..about.streams.len())
+        let streams = (0..host.rungs())
             .map(|rung| {
+                let (light, snapshots) = match rung.checked_sub(about.streams.len()) {
+                    None => (light(rung), snapshot(rung)),
+                    Some(number) => (part(number), part_snapshot(number)),
+                };
                 Ok(Light {
                     groups: LightGroups::new(rung),
-                    light: Groups::new(track(&light(rung))?, first_group, true),
-                    snapshots: track(&snapshot(rung))?,
+                    light: Groups::new(track(&light)?, first_group, true),
+                    snapshots: track(&snapshots)?,
                 })
             })
             .collect::<Result<Vec<_>, LinkError>>()?;

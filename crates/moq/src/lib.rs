@@ -11,6 +11,7 @@
 //! serves.
 
 mod about;
+mod light;
 mod names;
 mod pump;
 mod texts;

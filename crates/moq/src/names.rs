@@ -29,6 +29,16 @@ pub(crate) fn snapshot(rung: usize) -> String {
     format!("snapshot/{rung}")
 }
 
+/// The track of a part's light.
+pub(crate) fn part(number: usize) -> String {
+    format!("part/{number}")
+}
+
+/// The track of its snapshots.
+pub(crate) fn part_snapshot(number: usize) -> String {
+    format!("part-snapshot/{number}")
+}
+
 /// Names of one host's broadcasts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Names {

@@ -3,18 +3,16 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use dapple_session::{
-    FromHost, FromViewer, MAX_FROM_HOST_BYTES, MAX_LIGHT_MESSAGE_BYTES, PROTOCOL, Reason, Refusal, Terms,
-    WIRE,
-};
-use futures_channel::oneshot;
+use dapple_session::{FromHost, FromViewer, MAX_FROM_HOST_BYTES, PROTOCOL, Reason, Refusal, Terms, WIRE};
+use futures_channel::{mpsc, oneshot};
 use futures_util::future::{Either, select, try_join};
 use moq_net::{Timestamp, broadcast, group, origin, track};
 
 use crate::about::MAX_ABOUT_BYTES;
-use crate::names::{ABOUT, LOOKS, STATE, TALK, light, snapshot};
+use crate::light::{self, Seen};
+use crate::names::{ABOUT, LOOKS, STATE, TALK};
 use crate::pump::{Messages, Pump};
-use crate::texts::{Texts, light_subscription, read, subscription};
+use crate::texts::{Texts, subscription};
 use crate::{About, LinkError, Message, Names};
 
 /// Most messages of a group of words.
@@ -29,6 +27,8 @@ pub struct Wish {
     pub bits_per_s: Option<u64>,
     /// Its name, 32 to 64 hexadecimal digits that nobody can guess.
     pub viewer: String,
+    /// Whether it can take the light in parts, and its looks say which it needs.
+    pub parts: bool,
 }
 
 /// Finds a host and what it says of itself: `from` is what the connection brings, and what is written to `to` must go out by it. Waits until the host is
@@ -51,22 +51,26 @@ pub async fn join(
         return Err(LinkError::Ended("the host has ended".to_owned()));
     };
     let about = About::parse(&text)?;
+    let (sees, seen) = mpsc::unbounded();
     let own = to.create_broadcast(names.from_viewer(&wish.viewer).as_str())?;
     let out = ViewerOut {
         talk: Words::new(own.create_track(TALK, None)?),
         looks: own.create_track(LOOKS, None)?,
         lost: Arc::default(),
         broadcast: own,
+        sees,
     };
     out.broadcast.announce(origin::Route::default())?;
     let host = Terms { protocol: about.protocol, wire: about.wire, scene: &about.scene };
     let viewer = Terms { protocol: PROTOCOL, wire: WIRE, scene: &wish.scene };
+    let rung = about.stream_for(wish.bits_per_s);
     let reading = Reader {
         from: from.clone(),
         to_viewer: names.to_viewer(&wish.viewer),
         // Said as the host would, to those too who do not ask it.
         refusal: viewer.refusal(host),
-        rung: about.stream_for(wish.bits_per_s),
+        rung,
+        parts: (wish.parts && rung == 0 && about.parts > 0).then_some((about.parts, seen)),
         shared,
         lost: out.lost.clone(),
     };
@@ -79,6 +83,8 @@ pub struct ViewerOut {
     looks: track::Producer,
     /// Breaks that it told of.
     lost: Arc<AtomicU32>,
+    /// Parts of the light that it sees; all where it does not say.
+    sees: mpsc::UnboundedSender<Option<Vec<u8>>>,
     /// It is gone with this.
     broadcast: broadcast::Producer,
 }
@@ -92,6 +98,8 @@ impl ViewerOut {
         match FromViewer::parse(text) {
             Ok(FromViewer::Look(look)) => {
                 self.lost.store(look.lost, Ordering::Relaxed);
+                // Nobody listens where the light comes as one.
+                let _ = self.sees.unbounded_send(look.parts);
                 let mut group = self.looks.append_group()?;
                 group.write_frame(Timestamp::now(), text.to_owned())?;
                 Ok(group.finish()?)
@@ -179,6 +187,8 @@ struct Reader {
     to_viewer: String,
     refusal: Option<Refusal>,
     rung: usize,
+    /// How many parts the light comes in, if it does, and what the viewer sees of them.
+    parts: Option<(usize, Seen)>,
     shared: broadcast::Consumer,
     lost: Arc<AtomicU32>,
 }
@@ -191,7 +201,7 @@ impl Reader {
         let (for_light, light_may) = oneshot::channel();
         let (for_words, words_may) = oneshot::channel();
         let state = state(&self.shared, messages.clone(), [for_light, for_words]);
-        let light = Light::read(&self.shared, self.rung, &self.lost, messages.clone(), light_may);
+        let light = light::read(&self.shared, self.rung, self.parts, &self.lost, messages.clone(), light_may);
         let words = words(&self.from, &self.to_viewer, messages, words_may);
         let shared = Box::pin(try_join(state, light));
         match select(shared, Box::pin(words)).await {
@@ -244,86 +254,4 @@ async fn words(
         messages.put(Message::Text(text)).await?;
     }
     Err(LinkError::Ended("the host hears this viewer no more".to_owned()))
-}
-
-/// A stream of light, group after group.
-struct Light<'a> {
-    track: track::Consumer,
-    snapshots: track::Consumer,
-    messages: Messages,
-    /// The group that was read last, if all of it was.
-    last: Option<u64>,
-    /// Breaks that the viewer told of, and those that were mended.
-    lost: &'a AtomicU32,
-    mended: u32,
-}
-
-impl Light<'_> {
-    async fn read(
-        shared: &broadcast::Consumer,
-        rung: usize,
-        lost: &AtomicU32,
-        messages: Messages,
-        is_welcome: oneshot::Receiver<()>,
-    ) -> Result<(), LinkError> {
-        let (track, snapshots) = (shared.track(&light(rung))?, shared.track(&snapshot(rung))?);
-        let mut groups = track.subscribe(light_subscription()).await?.ordered();
-        // A welcome says what becomes of light that was held before.
-        let _ = is_welcome.await;
-        let mended = lost.load(Ordering::Relaxed);
-        let mut light = Light { track, snapshots, messages, last: None, lost, mended };
-        while let Some(mut group) = groups.next_group().await? {
-            let sequence = group.sequence;
-            let follows = light.last.is_some_and(|last| last + 1 == sequence) && !light.is_broken();
-            light.last = None;
-            if !follows && !light.snapshot(sequence).await? {
-                // It is gone; the next group has one too.
-                continue;
-            }
-            if light.group(&mut group, sequence).await? {
-                light.last = Some(sequence);
-            }
-        }
-        Ok(())
-    }
-
-    /// Whether the viewer has found that something does not fit since this was mended last.
-    fn is_broken(&self) -> bool {
-        self.lost.load(Ordering::Relaxed) != self.mended
-    }
-
-    /// What a group builds on; false if it cannot be had.
-    async fn snapshot(&mut self, sequence: u64) -> Result<bool, LinkError> {
-        self.mended = self.lost.load(Ordering::Relaxed);
-        let Ok(mut group) = self.snapshots.fetch_group(sequence, None).await else { return Ok(false) };
-        loop {
-            match read(&mut group, MAX_LIGHT_MESSAGE_BYTES).await {
-                Ok(Some(bytes)) => self.messages.put(Message::Bytes(bytes)).await?,
-                Ok(None) => return Ok(true),
-                Err(LinkError::Ended(_)) => return Ok(false),
-                Err(error) => return Err(error),
-            }
-        }
-    }
-
-    /// All of a group; false if it was cut off. When the viewer finds that something does not fit, it gets the group again from its snapshot on.
-    async fn group(&mut self, group: &mut group::Consumer, sequence: u64) -> Result<bool, LinkError> {
-        loop {
-            if self.is_broken() {
-                tracing::debug!(sequence, "light did not fit: once more from the group's snapshot");
-                if !self.snapshot(sequence).await? {
-                    return Ok(false);
-                }
-                let Ok(again) = self.track.fetch_group(sequence, None).await else { return Ok(false) };
-                *group = again;
-            }
-            match read(group, MAX_LIGHT_MESSAGE_BYTES).await {
-                // The mark at its end.
-                Ok(Some(bytes)) if bytes.is_empty() => return Ok(true),
-                Ok(Some(bytes)) => self.messages.put(Message::Bytes(bytes)).await?,
-                Ok(None) | Err(LinkError::Ended(_)) => return Ok(false),
-                Err(error) => return Err(error),
-            }
-        }
-    }
 }

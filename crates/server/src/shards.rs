@@ -1,12 +1,12 @@
-//! Light of one scene from several servers: which instances each lights, and their stores put together.
+//! Light of one scene from several servers: which instances each lights, and what is published of them.
 
 use std::sync::Arc;
 
-use dapple_scene::Scene;
-use dapple_store::charts::Cuts;
-use dapple_store::points::{BentChange, Change, LayoutError, PointLayout, PointStore};
+use dapple_scene::glam::Vec3;
+use dapple_scene::{Aabb, Scene};
+use dapple_store::points::PointStore;
 use dapple_stream::{
-    Applied, Budget, Frame, FrameKind, Limits, Publisher, PublisherConfig, ReceiveError, Spending, Subscriber,
+    Applied, Budget, Frame, FrameKind, Limits, Parts, Publisher, PublisherConfig, ReceiveError, Spending,
 };
 use dapple_trace::psao::generate::{GenerateError, GenerateParams, PointLayer};
 
@@ -25,156 +25,183 @@ impl Shard {
     /// Most parts.
     pub const MOST: u32 = 256;
 
-    /// Its instances, ascending: parts have about as many points. A function of scene and parameters alone, so servers need not agree
-    /// on more than those.
+    /// Its instances, ascending: one of [`Shard::all`].
     ///
     /// # Errors
     /// The density is no number above 0.
     pub fn instances(&self, scene: &Scene, params: &GenerateParams) -> Result<Vec<u32>, GenerateError> {
+        let mut all = Shard::all(self.of, scene, params)?;
+        Ok(if (self.number as usize) < all.len() {
+            all.swap_remove(self.number as usize)
+        } else {
+            Vec::new()
+        })
+    }
+
+    /// The instances of so many parts, each ascending. Parts have about as many points, and lie together, so that who sees a place needs few of them. A
+    /// function of scene and parameters alone, so servers need not agree on more than those.
+    ///
+    /// # Errors
+    /// The density is no number above 0.
+    pub fn all(of: u32, scene: &Scene, params: &GenerateParams) -> Result<Vec<Vec<u32>>, GenerateError> {
         let layer = PointLayer::new(scene, params)?;
-        let points = |instance: &u32| layer.most_points(*instance as usize);
-        let mut order: Vec<u32> = (0..scene.instances.len() as u32).collect();
-        order.sort_by_key(|instance| (std::cmp::Reverse(points(instance)), *instance));
-        // The largest first, each to who has least.
-        let mut loads = vec![0u64; self.of.max(1) as usize];
-        let mut own = Vec::new();
-        for instance in order {
-            let least = (0..loads.len()).min_by_key(|part| loads[*part]).expect("there is a part");
-            loads[least] += points(&instance);
-            if least as u32 == self.number {
-                own.push(instance);
-            }
-        }
-        own.sort_unstable();
-        Ok(own)
+        let pose = scene.pose(0.0);
+        let place = |instance: usize| {
+            let bounds = scene.instance_bounds_world(&pose, instance);
+            // What is nowhere at first may come to be anywhere.
+            let center = if bounds.is_empty() { Vec3::ZERO } else { bounds.center() };
+            Placed { instance: instance as u32, center, points: layer.most_points(instance) }
+        };
+        let mut placed: Vec<Placed> = (0..scene.instances.len()).map(place).collect();
+        let mut parts = Vec::new();
+        divide(&mut placed, of.clamp(1, Shard::MOST), &mut parts);
+        Ok(parts)
     }
 }
 
-/// Why a part was not put into the whole. It is as it was before.
-#[derive(Debug, thiserror::Error)]
-pub enum MergeError {
-    /// The frame could not be used.
-    #[error(transparent)]
-    Receive(#[from] ReceiveError),
-    /// Its points do not fit those of the others: it lights other instances than its own, or with another density.
-    #[error(transparent)]
-    Layout(#[from] LayoutError),
+/// An instance, where it is at first, and how much it has to be lit.
+struct Placed {
+    instance: u32,
+    center: Vec3,
+    points: u64,
 }
 
-/// Puts the stores of several servers together and publishes them as one.
+/// Halves and halves again until there are so many parts.
+fn divide(instances: &mut [Placed], of: u32, parts: &mut Vec<Vec<u32>>) {
+    if of <= 1 {
+        let mut part: Vec<u32> = instances.iter().map(|placed| placed.instance).collect();
+        part.sort_unstable();
+        parts.push(part);
+        return;
+    }
+    let (first, second) = (of / 2, of - of / 2);
+    let extent = Aabb::from_points(instances.iter().map(|placed| placed.center));
+    let edges = if instances.is_empty() { Vec3::ZERO } else { extent.max - extent.min };
+    let longest = edges.max_element().max(f32::MIN_POSITIVE);
+    let mut best = (f32::INFINITY, Cut::default());
+    for axis in 0..3 {
+        for backward in [false, true] {
+            order(instances, axis, backward);
+            let (at, off) = cut(instances, first, second);
+            // Across the longer side parts are more compact, which is worth a little balance.
+            let cost = off + COMPACTNESS * (1.0 - edges[axis] / longest);
+            if cost < best.0 {
+                best = (cost, Cut { axis, backward, at });
+            }
+        }
+    }
+    let Cut { axis, backward, at } = best.1;
+    order(instances, axis, backward);
+    let (low, high) = instances.split_at_mut(at);
+    divide(low, first, parts);
+    divide(high, second, parts);
+}
+
+/// How far a cut may be off its share, as a part of all, to go across a side much longer than another.
+const COMPACTNESS: f32 = 0.1;
+
+/// A plane, and how many instances come before it.
+#[derive(Clone, Copy, Default)]
+struct Cut {
+    axis: usize,
+    backward: bool,
+    at: usize,
+}
+
+fn order(instances: &mut [Placed], axis: usize, backward: bool) {
+    let key = |placed: &Placed| if backward { -placed.center[axis] } else { placed.center[axis] };
+    instances.sort_by(|a, b| key(a).total_cmp(&key(b)).then(a.instance.cmp(&b.instance)));
+}
+
+/// After how many instances to cut so that points are shared as `first` to `second`, and how far off that is, as a part of all.
+fn cut(instances: &[Placed], first: u32, second: u32) -> (usize, f32) {
+    let total: u64 = instances.iter().map(|placed| placed.points).sum();
+    let wanted = total * u64::from(first) / u64::from(first + second);
+    // A part without instances would have nothing to do.
+    let least = (first as usize).min(instances.len());
+    let most = instances.len().saturating_sub(second as usize).max(least);
+    let mut best = (least, u64::MAX);
+    let mut before = 0;
+    for (at, placed) in (1..).zip(instances) {
+        before += placed.points;
+        if (least..=most).contains(&at) && before.abs_diff(wanted) < best.1 {
+            best = (at, before.abs_diff(wanted));
+        }
+    }
+    (best.0, best.1 as f32 / total.max(1) as f32)
+}
+
+/// Puts the stores of several servers together and publishes them: as one, and each by itself for those who want some parts alone.
 pub struct Merger {
-    shards: Vec<Part>,
-    store: PointStore,
-    cuts: Cuts,
+    light: Parts,
+    nothing: PointStore,
     streams: Vec<Stream>,
-    /// The layout is another one than the one that was published.
+    /// The points are others than those that were published.
+    is_new: bool,
+    /// One a part, if parts are offered.
+    parts: Vec<PartStream>,
+    config: PublisherConfig,
+    scene_hash: [u8; 32],
+}
+
+/// A part's light, published by itself.
+struct PartStream {
+    publisher: Publisher,
     is_new: bool,
 }
 
-/// One server's light.
-struct Part {
-    subscriber: Subscriber,
-    /// Its instances that have points in the whole.
-    instances: Vec<u32>,
-}
-
 impl Merger {
-    /// Of so many servers of a scene; as [`crate::ServerConfig`] for the rest. It publishes nothing before the first has light.
+    /// Of the servers of a scene; as [`crate::ServerConfig`] for the rest. It publishes nothing before the first has light.
     pub fn new(
         scene: &Arc<Scene>,
-        shards: u32,
         config: PublisherConfig,
         bits_per_s: Option<u64>,
         limits: Limits,
     ) -> Merger {
-        let hash = scene.hash().0;
-        let part = || Part { subscriber: Subscriber::new(Some(hash), limits), instances: Vec::new() };
-        let publisher = Publisher::new(hash, config);
+        let scene_hash = scene.hash().0;
+        let publisher = Publisher::new(scene_hash, config);
         Merger {
-            shards: (0..shards).map(|_| part()).collect(),
-            store: PointStore::default(),
-            cuts: Cuts::default(),
+            light: Parts::new(Some(scene_hash), limits),
+            nothing: PointStore::default(),
             streams: vec![Stream { publisher, budget: bits_per_s.map(Budget::new) }],
             is_new: false,
+            parts: Vec::new(),
+            config,
+            scene_hash,
         }
+    }
+
+    /// Publishes each of so many parts by itself too: as stream number [`Merger::streams`] and those that follow.
+    pub fn offer_parts(&mut self, parts: u32) {
+        let (hash, config) = (self.scene_hash, self.config);
+        let part = |_| PartStream { publisher: Publisher::new(hash, config), is_new: false };
+        self.parts = (0..parts).map(part).collect();
+    }
+
+    /// Streams of the whole.
+    pub fn streams(&self) -> usize {
+        self.streams.len()
     }
 
     /// A server begins anew, perhaps another one in its place: its next frame is a snapshot of any group. What came before stays until then.
     pub fn begin(&mut self, shard: u32) {
-        self.shards[shard as usize].subscriber.forget();
+        self.light.begin(shard);
     }
 
     /// Takes a frame of a server.
     ///
     /// # Errors
     /// It does not fit; a snapshot of that server mends it.
-    pub fn receive(&mut self, shard: u32, frame: &[u8]) -> Result<(), MergeError> {
-        let applied = self.shards[shard as usize].subscriber.receive(frame)?;
-        let part = &self.shards[shard as usize];
-        match applied {
-            Applied::Ignored(_) => Ok(()),
-            Applied::Changes(changes) => {
-                let layout = part.subscriber.store().expect("changes are of a store").layout();
-                let mut place = self.places_of(layout);
-                let news = changes.iter().filter_map(|change| {
-                    Some(Change { point: place(change.point)?, visibility: change.new })
-                });
-                let news: Vec<Change> = news.collect();
-                let mut place = self.places_of(layout);
-                let bent = part.subscriber.bent_changes().iter();
-                let bent: Vec<BentChange> = bent
-                    .filter_map(|change| Some(BentChange { point: place(change.point)?, ..*change }))
-                    .collect();
-                self.store.apply(&news).expect("they are points of the whole");
-                self.store.apply_bent(&bent).expect("the whole has what its parts have");
-                Ok(())
-            }
+    pub fn receive(&mut self, shard: u32, frame: &[u8]) -> Result<(), ReceiveError> {
+        match self.light.receive(shard, frame)? {
+            Applied::Ignored(_) | Applied::Changes(_) => {}
             Applied::NewLayout | Applied::Sets { .. } => {
-                let merged = self.replace(shard as usize);
-                if merged.is_err() {
-                    // What it says next would not fit either: it begins anew.
-                    self.shards[shard as usize].subscriber.forget();
+                self.is_new = true;
+                if let Some(part) = self.parts.get_mut(shard as usize) {
+                    part.is_new = true;
                 }
-                Ok(merged?)
             }
         }
-    }
-
-    /// Where in the whole the points of a part are, to be asked in their order.
-    fn places_of(&self, part: &PointLayout) -> impl FnMut(u32) -> Option<u32> + use<> {
-        let whole = self.store.layout();
-        let first_of = |instance| whole.set_of_instance(instance).map(|set| set.first);
-        let sets: Vec<_> = part
-            .sets()
-            .iter()
-            .map(|set| (set.first..set.first + set.len() as u32, first_of(set.instance)))
-            .collect();
-        let mut at = 0;
-        move |point| {
-            while point >= sets[at].0.end {
-                at += 1;
-            }
-            sets[at].1.map(|first| first + point - sets[at].0.start)
-        }
-    }
-
-    /// Puts a part's sets in the place of those that it had.
-    fn replace(&mut self, shard: usize) -> Result<(), LayoutError> {
-        let part = &self.shards[shard];
-        let of_part = part.subscriber.store().expect("it has just come");
-        let whole = if self.store.layout().sets().is_empty() {
-            of_part.clone()
-        } else {
-            self.store.with_sets(&part.instances, of_part)?
-        };
-        let cuts = part.subscriber.cuts().cloned().unwrap_or_default();
-        self.cuts = self.cuts.with_sets(&part.instances, &cuts);
-        self.store = whole;
-        self.shards[shard].instances = self.shards[shard]
-            .subscriber
-            .store()
-            .map_or_else(Vec::new, |store| store.layout().sets().iter().map(|set| set.instance).collect());
-        self.is_new = true;
         Ok(())
     }
 
@@ -184,36 +211,54 @@ impl Merger {
         self.streams.push(Stream { publisher, budget: bits_per_s.map(Budget::new) });
     }
 
-    /// Whether the next frames bring or take points: all streams must be published then.
+    /// Whether the next frames bring or take points: all streams of the whole must be published then.
     pub fn is_new(&self) -> bool {
         self.is_new
     }
 
-    /// Publishes what has come in all streams that `wants`; nothing for the others.
+    /// Publishes what has come in all streams that `wants`; nothing for the others. Those of the whole come first, then those of parts, if any.
     pub fn publish(&mut self, sent_s: f64, wants: &dyn Fn(usize) -> bool) -> Vec<Option<Frame>> {
         let is_new = std::mem::take(&mut self.is_new);
-        let (store, cuts) = (&self.store, &self.cuts);
-        let has_points = !store.layout().sets().is_empty();
-        let publish = |(number, stream): (usize, &mut Stream)| {
-            if !has_points || !(is_new || wants(number)) {
+        let light = &self.light;
+        let whole = |(number, stream): (usize, &mut Stream)| {
+            let store = light.store()?;
+            if !(is_new || wants(number)) {
                 return None;
             }
             if is_new {
-                stream.publisher.set_cuts(store.layout().clone(), cuts.clone());
+                stream.publisher.set_cuts(store.layout().clone(), light.cuts().clone());
             }
             stream.publish(store, &[], sent_s)
         };
-        self.streams.iter_mut().enumerate().map(publish).collect()
+        let mut frames: Vec<Option<Frame>> = self.streams.iter_mut().enumerate().map(whole).collect();
+        let streams = frames.len();
+        let part = |(number, part): (usize, &mut PartStream)| {
+            let light = light.part(number as u32)?;
+            // What is offered waits until somebody wants it: its publisher begins with all that there is then.
+            if !wants(streams + number) {
+                return None;
+            }
+            let store = light.store()?;
+            if std::mem::take(&mut part.is_new) {
+                part.publisher.set_cuts(store.layout().clone(), light.cuts().cloned().unwrap_or_default());
+            }
+            part.publisher.publish(store)
+        };
+        frames.extend(self.parts.iter_mut().enumerate().map(part));
+        frames
     }
 
     /// The snapshot that brings a subscriber of a stream up to date; nothing before any light came.
     pub fn join_stream(&self, stream: usize) -> Option<Frame> {
-        self.streams[stream].publisher.join()
+        match self.streams.get(stream) {
+            Some(stream) => stream.publisher.join(),
+            None => self.parts.get(stream - self.streams.len())?.publisher.join(),
+        }
     }
 
     /// Everything that has come.
     pub fn store(&self) -> &PointStore {
-        &self.store
+        self.light.store().unwrap_or(&self.nothing)
     }
 }
 

@@ -32,5 +32,5 @@ pub use guest::{Guest, GuestConfig, GuestError, News};
 pub use light::{Assembled, Assembly, CHUNK_BYTES, LightHead, MAX_LIGHT_MESSAGE_BYTES};
 pub use message::{
     Event, FromHost, FromViewer, Held, Hello, Look, LookCamera, MAX_FROM_HOST_BYTES, MAX_FROM_VIEWER_BYTES,
-    MessageError, PROTOCOL, Reason, Refusal, Role, Status, Terms, Welcome, stream_within,
+    MAX_PARTS, MessageError, PROTOCOL, Reason, Refusal, Role, Status, Terms, Welcome, stream_within,
 };

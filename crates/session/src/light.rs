@@ -5,18 +5,23 @@ use crate::MessageError;
 /// Most bytes of a frame in one message.
 pub const CHUNK_BYTES: usize = 64 << 10;
 
-/// Bytes before them: see [`LightHead`].
-const HEAD_BYTES: usize = 1 + 4 * 8 + 2 * 4;
+/// Bytes of the fields before them: see [`LightHead`].
+const FIELD_BYTES: usize = 4 * 8 + 2 * 4;
 
 /// Longest message of light.
-pub const MAX_LIGHT_MESSAGE_BYTES: usize = HEAD_BYTES + CHUNK_BYTES;
+pub const MAX_LIGHT_MESSAGE_BYTES: usize = 2 + FIELD_BYTES + CHUNK_BYTES;
 
-/// The first byte.
-const KIND: u8 = b'L';
+/// The first byte, of light that comes as one.
+const WHOLE: u8 = b'L';
 
-/// Says what a piece of light is. On the wire: the letter `L`, then the fields in their order, little-endian.
+/// The first byte where the second is the number of a part.
+const PART: u8 = b'P';
+
+/// Says what a piece of light is. On the wire: the letter `L`, or `P` and the part's number, then the other fields in their order, little-endian.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LightHead {
+    /// The part of the light that the frame is of; `None` where light comes as one.
+    pub part: Option<u8>,
     /// The host's clock as the step began, microseconds: what it names is as old as that.
     pub stamp_us: u64,
     /// The host's clock when the step was done.
@@ -39,8 +44,11 @@ impl LightHead {
         let mut offset = 0;
         pieces
             .map(|piece| {
-                let mut bytes = Vec::with_capacity(HEAD_BYTES + piece.len());
-                bytes.push(KIND);
+                let mut bytes = Vec::with_capacity(2 + FIELD_BYTES + piece.len());
+                match self.part {
+                    None => bytes.push(WHOLE),
+                    Some(part) => bytes.extend([PART, part]),
+                }
                 for field in [self.stamp_us, self.made_us, self.scene_us, self.state] {
                     bytes.extend(field.to_le_bytes());
                 }
@@ -61,20 +69,24 @@ impl LightHead {
         if message.len() > MAX_LIGHT_MESSAGE_BYTES {
             return Err(MessageError::TooLong { bytes: message.len(), limit: MAX_LIGHT_MESSAGE_BYTES });
         }
-        let (head, piece) =
-            message.split_at_checked(HEAD_BYTES).ok_or(MessageError::Light("a message is cut off"))?;
-        if head[0] != KIND {
-            return Err(MessageError::Light("a message of bytes does not begin with L"));
-        }
+        let cut = MessageError::Light("a message is cut off");
+        let (part, fields) = match *message {
+            [WHOLE, ref fields @ ..] => (None, fields),
+            [PART, part, ref fields @ ..] => (Some(part), fields),
+            [] | [PART] => return Err(cut),
+            _ => return Err(MessageError::Light("a message of bytes begins with neither L nor P")),
+        };
+        let (head, piece) = fields.split_at_checked(FIELD_BYTES).ok_or(cut)?;
         let long = |at: usize| u64::from_le_bytes(head[at..at + 8].try_into().expect("eight bytes"));
         let short = |at: usize| u32::from_le_bytes(head[at..at + 4].try_into().expect("four bytes"));
         let head = LightHead {
-            stamp_us: long(1),
-            made_us: long(9),
-            scene_us: long(17),
-            state: long(25),
-            total: short(33),
-            offset: short(37),
+            part,
+            stamp_us: long(0),
+            made_us: long(8),
+            scene_us: long(16),
+            state: long(24),
+            total: short(32),
+            offset: short(36),
         };
         let end = u64::from(head.offset) + piece.len() as u64;
         let fits = end <= u64::from(head.total) && (piece.is_empty() == (head.total == 0));
@@ -149,10 +161,11 @@ mod tests {
 
     #[test]
     fn frames_of_every_length_come_through() {
-        for length in [0, 1, CHUNK_BYTES - 1, CHUNK_BYTES, CHUNK_BYTES + 1, 3 * CHUNK_BYTES] {
+        let lengths = [0, 1, CHUNK_BYTES - 1, CHUNK_BYTES, CHUNK_BYTES + 1, 3 * CHUNK_BYTES];
+        for (length, part) in lengths.into_iter().flat_map(|length| [(length, None), (length, Some(7))]) {
             let frame: Vec<u8> = (0..length).map(|i| (i * 7 % 251) as u8).collect();
             let head =
-                LightHead { stamp_us: 5, made_us: 9, scene_us: 1 << 40, state: 3, total: 0, offset: 0 };
+                LightHead { part, stamp_us: 5, made_us: 9, scene_us: 1 << 40, state: 3, total: 0, offset: 0 };
             let messages = head.messages(&frame);
             assert!(messages.iter().all(|message| message.len() <= MAX_LIGHT_MESSAGE_BYTES));
             let mut assembly = Assembly::default();
@@ -164,7 +177,8 @@ mod tests {
                     assert_eq!(assembly.progress(), ((index + 1) * CHUNK_BYTES, length));
                 } else {
                     let Assembled::Whole(whole, bytes) = assembled else { panic!("{assembled:?}") };
-                    assert_eq!((whole.scene_us, whole.state, bytes), (1 << 40, 3, frame.clone()));
+                    assert_eq!((whole.part, whole.scene_us, whole.state), (part, 1 << 40, 3));
+                    assert_eq!(bytes, frame);
                 }
             }
         }
@@ -197,10 +211,13 @@ mod tests {
     #[test]
     fn broken_messages_are_refused() {
         let good = LightHead { made_us: 1, ..LightHead::default() }.messages(&[1, 2, 3]);
-        assert!(LightHead::parse(&good[0]).is_ok());
-        for length in 0..good[0].len() {
-            let cut = LightHead::parse(&good[0][..length]);
-            assert!(cut.is_err() || length > HEAD_BYTES, "{length}");
+        let of_part = LightHead { made_us: 1, part: Some(9), ..LightHead::default() }.messages(&[1, 2, 3]);
+        for good in [&good[0], &of_part[0]] {
+            assert!(LightHead::parse(good).is_ok());
+            for length in 0..good.len() {
+                let cut = LightHead::parse(&good[..length]);
+                assert!(cut.is_err() || length > 1 + FIELD_BYTES, "{length}");
+            }
         }
         let mut other = good[0].to_vec();
         other[0] = b'M';

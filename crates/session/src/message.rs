@@ -12,6 +12,9 @@ pub const PROTOCOL: u32 = 1;
 /// Longest message of a viewer, bytes.
 pub const MAX_FROM_VIEWER_BYTES: usize = 16 << 10;
 
+/// Most parts of the light.
+pub const MAX_PARTS: usize = 256;
+
 /// Longest text of a host that a viewer takes, bytes: the edits of some 10,000 instances.
 pub const MAX_FROM_HOST_BYTES: usize = 4 << 20;
 
@@ -64,8 +67,11 @@ impl FromViewer {
     pub fn parse(text: &str) -> Result<FromViewer, MessageError> {
         check_length(text, MAX_FROM_VIEWER_BYTES)?;
         let message: FromViewer = serde_json::from_str(text)?;
-        if let FromViewer::Look(Look { camera: Some(camera), .. }) = &message {
-            camera.check()?;
+        if let FromViewer::Look(look) = &message {
+            look.camera.as_ref().map_or(Ok(()), LookCamera::check)?;
+            if look.parts.as_ref().is_some_and(|parts| parts.len() > MAX_PARTS) {
+                return Err(MessageError::OutOfRange("a viewer sees at most 256 parts"));
+            }
         }
         if let FromViewer::Event { event: Event::Seek { time_s }, .. } = &message
             && !(0.0..=SceneClock::MAX_TIME_S).contains(time_s)
@@ -137,6 +143,9 @@ pub struct Look {
     /// How often, over this connection, something was missing that light built on.
     #[serde(default)]
     pub lost: u32,
+    /// The parts of the light that it sees, ascending, at most [`MAX_PARTS`]; `None` where it was told of none ([`Welcome::parts`]).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parts: Option<Vec<u8>>,
 }
 
 /// A camera in the world.
@@ -325,6 +334,10 @@ pub struct Welcome {
     pub clock_us: u64,
     /// See `clock_us`.
     pub unix_us: u64,
+    /// Where the light can be had in parts: which instances each has, as ranges of their numbers (the first, and the one after the last). Empty where it
+    /// comes as one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<Vec<[u32; 2]>>,
 }
 
 /// What a viewer may do.

@@ -19,6 +19,6 @@ pub mod session;
 
 pub use codec::{DecodeError, FrameHeader, FrameKind, Limits, ValueChange};
 pub use recording::{Recorder, Recording, RecordingError, RecordingHeader, Replay};
-pub use session::{Applied, IgnoreReason, ReceiveError, Subscriber};
+pub use session::{Applied, IgnoreReason, Parts, ReceiveError, Subscriber};
 #[cfg(feature = "publish")]
 pub use session::{Budget, Frame, Precision, Publisher, PublisherConfig, Spending};

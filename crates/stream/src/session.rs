@@ -6,6 +6,7 @@
 
 #[cfg(feature = "publish")]
 mod budget;
+mod parts;
 #[cfg(feature = "publish")]
 mod precision;
 #[cfg(feature = "publish")]
@@ -17,6 +18,7 @@ mod within;
 
 #[cfg(feature = "publish")]
 pub use budget::Budget;
+pub use parts::Parts;
 #[cfg(feature = "publish")]
 pub use precision::Precision;
 #[cfg(feature = "publish")]

@@ -64,7 +64,7 @@ impl Bot {
     fn take(&self, guest: &mut Guest, news: News, start: Instant) {
         let mut log = self.log();
         match news {
-            News::Light(frame) => {
+            News::Light { frame, .. } => {
                 if log.keeps_ages
                     && let (Some(welcome), Some(head)) = (guest.welcome(), guest.newest())
                 {

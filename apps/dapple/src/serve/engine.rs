@@ -95,16 +95,17 @@ impl Engine {
 
     fn start(&mut self) -> Result<Light> {
         let hub = self.hub.clone();
-        let (scene, rungs) = {
+        let (scene, rungs, offered) = {
             let host = hub.host();
-            (host.scene().clone(), host.config().rungs.clone())
+            let config = host.config();
+            (host.scene().clone(), config.rungs.clone(), config.parts.len())
         };
         if let Some((workforce, patience)) = self.workers.take() {
             let most = u32::try_from(scene.instances.len()).unwrap_or(u32::MAX);
             let limits = Limits::default();
             let limits = Limits { max_sets: limits.max_sets.max(most), ..limits };
-            let (parts, publish) = (workforce.parts() as u32, self.config.publish);
-            let mut merger = Merger::new(&scene, parts, publish, self.config.bits_per_s, limits);
+            let mut merger = Merger::new(&scene, self.config.publish, self.config.bits_per_s, limits);
+            merger.offer_parts(offered as u32);
             for bits_per_s in rungs.iter().skip(1) {
                 merger.add_stream(*bits_per_s);
             }
@@ -142,8 +143,7 @@ impl Engine {
         let (tick, looks, watched) = {
             let mut host = hub.host();
             let tick = host.begin_step(hub.now_us());
-            let watched: Vec<bool> =
-                (0..host.config().rungs.len()).map(|rung| host.is_watched(rung)).collect();
+            let watched: Vec<bool> = (0..host.rungs()).map(|rung| host.is_watched(rung)).collect();
             (tick, host.looks(MOST_VIEWS, turn), watched)
         };
         if let Some(edits) = &tick.edits {

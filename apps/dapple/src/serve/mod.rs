@@ -24,6 +24,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow, bail};
+use dapple_scene::Scene;
 use dapple_server::ServerConfig;
 use dapple_server::shards::Shard;
 use dapple_session::Role;
@@ -99,6 +100,7 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
         events_per_s: args.max_events,
         access: access(args),
         rungs: rungs(config.bits_per_s, args),
+        parts: parts(&asset.scene, &config, args)?,
         playing: !args.paused,
         ..HostConfig::default()
     };
@@ -268,6 +270,21 @@ fn check(args: &ServeArgs) -> Result<()> {
 /// Who may do what.
 fn access(args: &ServeArgs) -> Access {
     Access::new(args.token.iter().map(|token| (token.secret.clone(), token.role)).collect())
+}
+
+/// The instances of each part that viewers can take by itself: those of the workers, where streams are shared.
+fn parts(scene: &Scene, config: &ServerConfig, args: &ServeArgs) -> Result<Vec<Vec<u32>>> {
+    // Every viewer is told of all of them as it comes.
+    const MOST_INSTANCES: usize = 20_000;
+    let is_shared = args.moq.is_some() || !args.relay.is_empty();
+    let Some(of) = args.workers.filter(|of| is_shared && *of > 1) else { return Ok(Vec::new()) };
+    if scene.instances.len() > MOST_INSTANCES {
+        tracing::warn!(
+            "the scene has more than {MOST_INSTANCES} instances: viewers take its light as one, not in parts"
+        );
+        return Ok(Vec::new());
+    }
+    Ok(Shard::all(of, scene, &config.generate)?)
 }
 
 /// What workers are told.

@@ -5,11 +5,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use dapple_scene::Edits;
-use dapple_server::shards::MergeError;
 use dapple_session::host::{Access, Tick, hex};
 use dapple_session::work::{FromWorker, Setup, Step, StepDone, ToWorker, WorkerHello};
 use dapple_session::{Assembled, Assembly, LightHead, LookCamera, PROTOCOL, Reason, Refusal};
-use dapple_stream::Limits;
+use dapple_stream::{Limits, ReceiveError};
 use tokio::sync::watch;
 
 use crate::transport::{Inbound, LinkError, Message, Outbound};
@@ -354,11 +353,11 @@ impl Workforce {
     }
 
     /// Ends a worker's connection, because what it sends does not fit.
-    pub(crate) fn let_go(&self, shard: u32, error: &MergeError) {
+    pub(crate) fn let_go(&self, shard: u32, error: &ReceiveError) {
         // Other points than the host expects will not fit the next time either.
         let reason = match error {
-            MergeError::Layout(_) => Reason::Scene,
-            MergeError::Receive(_) => Reason::Closing,
+            ReceiveError::Misfit(_) => Reason::Scene,
+            _ => Reason::Closing,
         };
         let message = format!("the light of part {} does not fit that of the others: {error}", shard + 1);
         self.hub.let_go(shard, Refusal { reason, message });

@@ -36,8 +36,12 @@ pub(crate) fn client(certificate: Option<&str>) -> Result<Client, LinkError> {
     config.init(moq_tokio::quic::Config::default()).map_err(ended)
 }
 
-/// Connects to a host, or to a relay that has it.
-pub(crate) async fn connect(address: &MoqJson, hello: &Hello) -> Result<(ClientOut, ClientIn), LinkError> {
+/// Connects to a host, or to a relay that has it; `in_parts` to take the light in parts where it comes in some.
+pub(crate) async fn connect(
+    address: &MoqJson,
+    hello: &Hello,
+    in_parts: bool,
+) -> Result<(ClientOut, ClientIn), LinkError> {
     let names = Names::new(&address.name).map_err(from)?;
     let mut secret = [0; 16];
     getrandom::fill(&mut secret)
@@ -46,6 +50,7 @@ pub(crate) async fn connect(address: &MoqJson, hello: &Hello) -> Result<(ClientO
         scene: hello.scene.clone(),
         bits_per_s: hello.bits_per_s,
         viewer: dapple_session::host::hex(&secret),
+        parts: in_parts,
     };
     let url = address.url.replace(VIEWER, &wish.viewer);
     let url: Url =

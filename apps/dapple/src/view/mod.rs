@@ -118,7 +118,7 @@ fn open(args: &ViewArgs) -> Result<Opening> {
                         seed,
                         ..GuestConfig::default()
                     };
-                    Feed::Remote(Remote::join(address, &scene, config)?)
+                    Feed::Remote(Remote::join(address.in_parts(), &scene, config)?)
                 }
                 (None, Some(pieces)) => Feed::Recorded(Player::incoming(pieces, &scene)),
                 (None, None) => Feed::None,

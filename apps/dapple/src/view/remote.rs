@@ -32,7 +32,8 @@ pub(super) struct Remote {
 
 /// What comes for the viewer.
 pub(super) enum Piece {
-    Frame(Vec<u8>),
+    /// A frame of a part of the light, or of all of it.
+    Frame(Option<u8>, Vec<u8>),
     /// What is held is another stream's from here on.
     Anew,
 }
@@ -68,7 +69,7 @@ impl Remote {
                 }
             };
             let on_news = |_: &mut Guest, news| match news {
-                News::Light(frame) if !frame.is_empty() => hand_on(Piece::Frame(frame)),
+                News::Light { part, frame } if !frame.is_empty() => hand_on(Piece::Frame(part, frame)),
                 News::Welcome(false) => hand_on(Piece::Anew),
                 News::Rejected(message) => drop(rejected_sender.send(message)),
                 _ => {}

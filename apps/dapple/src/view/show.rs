@@ -204,15 +204,15 @@ impl Show {
         self.clock.seek(time_s);
         self.rejected = remote.rejected().or(self.rejected.take());
         for piece in remote.take_frames() {
-            let frame = match piece {
-                Piece::Frame(frame) => frame,
+            let (part, frame) = match piece {
+                Piece::Frame(part, frame) => (part, frame),
                 Piece::Anew => {
                     self.viewer.outdate();
                     continue;
                 }
             };
             let start = Instant::now();
-            let applied = self.viewer.receive(&frame, now_s);
+            let applied = self.viewer.receive_part(part, &frame, now_s);
             let held = self.viewer.held().map(|(group, epoch)| Held { group, epoch });
             remote.applied(held, applied.is_ok(), start.elapsed().as_secs_f64());
             match applied {

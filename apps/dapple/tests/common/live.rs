@@ -210,7 +210,7 @@ impl Viewer {
             }
         };
         match news {
-            Ok(News::Light(frame)) if !frame.is_empty() => self.apply(&frame),
+            Ok(News::Light { frame, .. }) if !frame.is_empty() => self.apply(&frame),
             Ok(News::Welcome(false)) => self.subscriber.outdate(),
             Ok(News::Rejected(reason)) => self.rejected.push(reason),
             Ok(_) => {}

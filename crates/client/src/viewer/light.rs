@@ -6,15 +6,16 @@ use dapple_gpu::Gpu;
 use dapple_render::forward::{AtlasBand, ForwardError, GpuScene};
 use dapple_render::psao::atlas::{AtlasParams, PointChange, VisibilityAtlas};
 use dapple_scene::Scene;
-use dapple_stream::{Applied, ReceiveError, Subscriber, ValueChange};
+use dapple_stream::{Applied, ReceiveError, ValueChange};
 
 use super::inspect::Inspection;
+use super::received::Received;
 use crate::pace::Pace;
 
 /// What comes off the wire, resolved into texels.
 pub(super) struct Light {
     scene: Arc<Scene>,
-    pub(super) subscriber: Subscriber,
+    pub(super) received: Received,
     pub(super) atlas: Option<VisibilityAtlas>,
     pub(super) inspection: Inspection,
     /// Whether what lies on the card is of another atlas.
@@ -27,11 +28,11 @@ pub(super) struct Light {
 }
 
 impl Light {
-    pub(super) fn new(scene: Arc<Scene>, subscriber: Subscriber) -> Light {
+    pub(super) fn new(scene: Arc<Scene>, received: Received) -> Light {
         let inspection = Inspection::default();
         Light {
             scene,
-            subscriber,
+            received,
             atlas: None,
             inspection,
             is_new: false,
@@ -44,18 +45,19 @@ impl Light {
     /// `fade_s` is how long fades take, as in [`Light::fade_s`].
     pub(super) fn receive(
         &mut self,
+        part: Option<u8>,
         bytes: &[u8],
         now_s: f64,
         fade_s: Option<f32>,
     ) -> Result<Applied, ReceiveError> {
-        let applied = self.subscriber.receive(bytes)?;
+        let applied = self.received.receive(part, bytes)?;
         match &applied {
             Applied::NewLayout => {
                 self.is_new = true;
                 self.problem = None;
                 self.inspection.reset();
-                let cuts = self.subscriber.cuts();
-                self.atlas = self.subscriber.store().map(|store| {
+                let cuts = self.received.cuts();
+                self.atlas = self.received.store().map(|store| {
                     VisibilityAtlas::new(store.layout().clone(), &self.scene, cuts, AtlasParams::default())
                 });
             }
@@ -63,8 +65,8 @@ impl Light {
                 self.inspection.forget_shown();
                 // There may be room now.
                 self.problem = None;
-                if let (Some(atlas), Some(store)) = (&mut self.atlas, self.subscriber.store()) {
-                    let cuts = self.subscriber.cuts();
+                if let (Some(atlas), Some(store)) = (&mut self.atlas, self.received.store()) {
+                    let cuts = self.received.cuts();
                     atlas.change_sets(&self.scene, store.layout().clone(), cuts, removed);
                 }
                 self.apply(changes, now_s, fade_s);
@@ -91,7 +93,7 @@ impl Light {
     /// Makes charts and weights, about `texels` of work; what becomes ready fades in from `now_s` on.
     pub(super) fn work(&mut self, texels: usize, now_s: f64, fade_s: Option<f32>) -> (u64, u64) {
         let fade_s = self.fade_s(fade_s);
-        let (Some(atlas), Some(store)) = (&mut self.atlas, self.subscriber.store()) else { return (0, 0) };
+        let (Some(atlas), Some(store)) = (&mut self.atlas, self.received.store()) else { return (0, 0) };
         if atlas.progress().is_complete() {
             let progress = atlas.progress();
             return (progress.done, progress.total);

@@ -11,6 +11,7 @@ mod inspect;
 mod light;
 mod options;
 mod paper;
+mod received;
 #[cfg(test)]
 mod tests;
 
@@ -22,13 +23,14 @@ use dapple_render::forward::{
 };
 use dapple_scene::{Edits, Pose, PosedCamera, Scene};
 use dapple_store::points::PointStore;
-use dapple_stream::{Applied, ReceiveError, Subscriber};
+use dapple_stream::{Applied, ReceiveError};
 
 use crate::{Picked, pick};
 use anchors::Anchors;
 use light::Light;
 pub use options::{DebugView, DrawOptions, LoadProgress, Method, ViewerConfig, ViewerError, ViewerStats};
 use paper::PaperLookup;
+use received::Received;
 
 /// One viewer's copy of the light on a graphics card, and the passes that draw with it.
 pub struct Viewer {
@@ -63,7 +65,7 @@ impl Viewer {
     pub fn new(gpu: &Gpu, scene: Arc<Scene>, config: ViewerConfig) -> Result<Viewer, ViewerError> {
         let mut limits = config.limits;
         limits.max_sets = limits.max_sets.max(u32::try_from(scene.instances.len()).unwrap_or(u32::MAX));
-        let subscriber = Subscriber::new(Some(scene.hash().0), limits);
+        let received = Received::new(scene.hash().0, limits);
         let gpu_scene = GpuScene::new(gpu, scene.clone(), &GpuSceneOptions { mips: config.mips })?;
         let forward = Forward::new(
             gpu,
@@ -72,7 +74,7 @@ impl Viewer {
             &[PaperLookup::lookup(gpu)],
         )?;
         Ok(Viewer {
-            light: Light::new(scene.clone(), subscriber),
+            light: Light::new(scene.clone(), received),
             edits: Edits::new(&scene),
             scene,
             gpu_scene,
@@ -123,7 +125,17 @@ impl Viewer {
     /// Takes one frame off the wire, which came at `now_s` (seconds on the caller's clock, as in [`Viewer::draw`]).
     /// On an error nothing has changed.
     pub fn receive(&mut self, bytes: &[u8], now_s: f64) -> Result<Applied, ReceiveError> {
-        let applied = self.light.receive(bytes, now_s, self.fade_s)?;
+        self.receive_part(None, bytes, now_s)
+    }
+
+    /// As [`Viewer::receive`], of light that comes in parts ([`dapple_stream::Parts`]), or (`None`) as one: whichever came last is shown.
+    pub fn receive_part(
+        &mut self,
+        part: Option<u8>,
+        bytes: &[u8],
+        now_s: f64,
+    ) -> Result<Applied, ReceiveError> {
+        let applied = self.light.receive(part, bytes, now_s, self.fade_s)?;
         self.stats.bytes_received += bytes.len() as u64;
         self.stats.frames_received += 1;
         self.stats.last_frame_s = Some(now_s);
@@ -184,7 +196,7 @@ impl Viewer {
         self.light.upload(gpu, &mut self.gpu_scene, now_s);
         let methods = [Some(options.method), options.split.map(|(_, method)| method)];
         if methods.contains(&Some(Method::PsaoPaper)) {
-            self.paper.prepare(gpu, &mut self.forward, self.light.subscriber.store());
+            self.paper.prepare(gpu, &mut self.forward, self.light.received.store());
         }
         let wants_points = options.view == DebugView::Points;
         // Only where points are shown must the processor know where deforming meshes are.
@@ -227,7 +239,7 @@ impl Viewer {
     }
 
     fn place_points(&mut self, gpu: &Gpu, pose: &Pose) {
-        let Some(store) = self.light.subscriber.store() else { return };
+        let Some(store) = self.light.received.store() else { return };
         let layout = store.layout();
         let shown = self.points.get_or_insert_with(|| PointsShown {
             anchors: Anchors::new(layout, &self.scene),
@@ -260,7 +272,7 @@ impl Viewer {
     pub fn stats(&self) -> ViewerStats {
         let bent = self.store().and_then(PointStore::bent).map_or(0, |planes| planes.len() as u64);
         let store_bytes = self.stats.points as u64 * (BYTES_A_STORED_POINT + bent);
-        let stream_bytes = self.light.subscriber.bytes() as u64;
+        let stream_bytes = self.light.received.bytes() as u64;
         let (atlas_bytes, texels) =
             self.light.atlas.as_ref().map_or((0, 0), |a| (a.memory_bytes(), a.texel_count() as u32));
         ViewerStats {
@@ -272,17 +284,17 @@ impl Viewer {
 
     /// What this viewer holds; nothing before the first snapshot.
     pub fn store(&self) -> Option<&PointStore> {
-        self.light.subscriber.store()
+        self.light.received.store()
     }
 
     /// What it holds is another stream's from now on: it stays to be seen until the next snapshot, of whatever group, replaces it.
     pub fn outdate(&mut self) {
-        self.light.subscriber.outdate();
+        self.light.received.outdate();
     }
 
-    /// Group and epoch of what it holds; nothing before the first snapshot.
+    /// Group and epoch of what it holds; nothing before the first snapshot, and where light comes in parts.
     pub fn held(&self) -> Option<(u64, u64)> {
-        self.light.subscriber.group().zip(self.light.subscriber.epoch())
+        self.light.received.held()
     }
 
     /// The scene that it shows.

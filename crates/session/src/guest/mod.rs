@@ -2,8 +2,10 @@
 
 mod backoff;
 mod pending;
+mod sight;
 mod timing;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use dapple_scene::{Edits, PosedCamera, Scene};
@@ -17,6 +19,7 @@ use crate::{
 };
 use backoff::Backoff;
 use pending::Pending;
+use sight::Sight;
 use timing::Timing;
 
 /// Shortest time between two looks, microseconds.
@@ -69,7 +72,12 @@ pub enum News {
     /// The scene's state changed: see [`Guest::edits`] and [`Guest::clock`].
     State,
     /// A frame of light to be applied; then [`Guest::applied`] must be called. Empty where nothing has changed.
-    Light(Vec<u8>),
+    Light {
+        /// The part that it is of (`dapple_stream::Parts`); `None` where light comes as one.
+        part: Option<u8>,
+        /// The frame.
+        frame: Vec<u8>,
+    },
     /// One of its events changed nothing, and why.
     Rejected(String),
 }
@@ -88,7 +96,10 @@ pub struct Guest {
     clock: SceneClock,
     version: u64,
     held: Option<Held>,
-    assembly: Assembly,
+    /// Frames that have come in part, by part of the light.
+    assemblies: BTreeMap<Option<u8>, Assembly>,
+    /// What it sees of the parts of the light, if it comes in some.
+    sight: Option<Sight>,
     pending: Pending,
     timing: Timing,
     backoff: Backoff,
@@ -115,7 +126,8 @@ impl Guest {
             clock: SceneClock::default(),
             version: 0,
             held: None,
-            assembly: Assembly::default(),
+            assemblies: BTreeMap::new(),
+            sight: None,
             pending: Pending::default(),
             timing: Timing::default(),
             backoff: Backoff::new(config.seed),
@@ -137,7 +149,8 @@ impl Guest {
         (self.look.heard_us, self.heard_at_us) = (0, now_us);
         // Versions count anew with another host; what was changed stays until the state comes.
         self.version = 0;
-        (self.assembly, self.newest) = (Assembly::default(), None);
+        (self.assemblies, self.newest) = (BTreeMap::new(), None);
+        (self.sight, self.look.parts) = (None, None);
         self.pending.connected();
     }
 
@@ -161,6 +174,9 @@ impl Guest {
                 }
                 self.backoff.reset();
                 let goes_on = self.light_goes_on(&welcome);
+                if !welcome.parts.is_empty() {
+                    self.sight = Some(Sight::new(&self.scene, &welcome.parts));
+                }
                 self.welcome = Some(welcome);
                 News::Welcome(goes_on)
             }
@@ -239,7 +255,11 @@ impl Guest {
             0 => dapple_stream::Limits::default().max_frame_bytes,
             most => most,
         };
-        Ok(match self.assembly.push(head, piece, most) {
+        // Frames of several parts may be on their way at once: together they may be as long as one.
+        let others = self.assemblies.iter().filter(|(part, _)| **part != head.part);
+        let others: usize = others.map(|(_, assembly)| assembly.progress().1).sum();
+        let assembly = self.assemblies.entry(head.part).or_default();
+        Ok(match assembly.push(head, piece, most.saturating_sub(others)) {
             Assembled::Part => News::Nothing,
             Assembled::Never if head.total as usize > most => {
                 return Err(MessageError::TooLong { bytes: head.total as usize, limit: most }.into());
@@ -253,7 +273,7 @@ impl Guest {
                 if head.stamp_us >= self.look.heard_us {
                     (self.look.heard_us, self.heard_at_us) = (head.stamp_us, now_us);
                 }
-                News::Light(frame)
+                News::Light { part: head.part, frame }
             }
         })
     }
@@ -332,6 +352,10 @@ impl Guest {
         self.look.number += 1;
         (self.look.held, self.look.state) = (self.held, self.version);
         self.look.waited_us = now_us.saturating_sub(self.heard_at_us);
+        let time_s = self.scene_time_s(now_us);
+        if let (Some(sight), Some(camera)) = (&mut self.sight, &self.look.camera) {
+            self.look.parts = Some(sight.parts(camera, time_s, &self.edits, now_us));
+        }
         (self.said, self.said_us) = (self.look.clone(), now_us);
         Some(FromViewer::Look(self.look.clone()).to_text())
     }
@@ -358,10 +382,8 @@ impl Guest {
 
     /// The scene's time to be shown at a moment, seconds: that of the light which comes then. 0 before any came.
     pub fn scene_time_s(&self, now_us: u64) -> f64 {
-        match self.timing.shown_host_us(now_us) {
-            Some(host_us) => self.clock.time_us(host_us) as f64 * 1e-6,
-            None => self.clock.time_us as f64 * 1e-6,
-        }
+        let shown_us = self.timing.shown_host_us(now_us);
+        shown_us.map_or(self.clock.time_us, |host_us| self.clock.time_us(host_us)) as f64 * 1e-6
     }
 
     /// Seconds since the moment that the light which came last shows; `None` before any came.
@@ -401,6 +423,7 @@ impl Guest {
 
     /// Bytes of an unfinished frame that have come, and all of it; zeros if there is none.
     pub fn progress(&self) -> (usize, usize) {
-        self.assembly.progress()
+        let all = self.assemblies.values().map(Assembly::progress);
+        all.fold((0, 0), |(came, total), (more, of)| (came + more, total + of))
     }
 }

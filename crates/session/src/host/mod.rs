@@ -26,8 +26,8 @@ pub use types::{Arrival, HostConfig, HostCounts, Link, Next, Outgoing, Shared, S
 use viewer::Viewer;
 
 use crate::{
-    Event, FromHost, FromViewer, Held, Hello, LookCamera, PROTOCOL, Reason, Refusal, Role, SceneClock, Terms,
-    WIRE, stream_within,
+    Event, FromHost, FromViewer, Held, Hello, LightHead, LookCamera, MAX_PARTS, PROTOCOL, Reason, Refusal,
+    Role, SceneClock, Terms, WIRE, stream_within,
 };
 
 /// Most ages kept between two questions.
@@ -77,6 +77,7 @@ impl Host {
         if config.rungs.is_empty() {
             config.rungs.push(None);
         }
+        config.parts.truncate(MAX_PARTS);
         let clock = SceneClock { playing: config.playing, time_us: 0, at_us: now_us };
         Host {
             scene_hash: hex(&scene.hash().0),
@@ -85,8 +86,8 @@ impl Host {
             viewers: BTreeMap::new(),
             next_viewer: 1,
             queue: VecDeque::new(),
-            rungs: config.rungs.iter().map(|_| Rung::default()).collect(),
-            shared: vec![false; config.rungs.len()],
+            rungs: (0..config.rungs.len() + config.parts.len()).map(|_| Rung::default()).collect(),
+            shared: vec![false; config.rungs.len() + config.parts.len()],
             tick: None,
             closing: None,
             counts: HostCounts::default(),
@@ -308,7 +309,7 @@ impl Host {
             self.counts.bytes += message.len() as u64;
             return Next::Send(Outgoing::Text(message));
         }
-        if viewer.change_stream(self.rungs.len() - 1, now_us) {
+        if viewer.change_stream(self.config.rungs.len() - 1, now_us) {
             viewer.welcome(link.viewer, false, &self.config, now_us);
             return self.next(link, now_us);
         }
@@ -373,7 +374,8 @@ impl Host {
     /// Gives out what a step made for a rung; nothing where it changed nothing.
     pub fn publish(&mut self, rung: usize, tick: &Tick, frame: Option<&Frame>, made_us: u64) {
         if let Some(frame) = frame {
-            self.rungs[rung].publish(tick.head(made_us), frame);
+            let head = self.head(rung, tick, made_us);
+            self.rungs[rung].publish(head, frame);
         }
     }
 
@@ -384,7 +386,18 @@ impl Host {
 
     /// Gives a snapshot of what a rung's viewers hold who are up to date.
     pub fn put_snapshot(&mut self, rung: usize, tick: &Tick, frame: &Frame, made_us: u64) {
-        self.rungs[rung].put_snapshot(tick.head(made_us), frame);
+        let head = self.head(rung, tick, made_us);
+        self.rungs[rung].put_snapshot(head, frame);
+    }
+
+    fn head(&self, rung: usize, tick: &Tick, made_us: u64) -> LightHead {
+        let part = rung.checked_sub(self.config.rungs.len()).and_then(|part| u8::try_from(part).ok());
+        LightHead { part, ..tick.head(made_us) }
+    }
+
+    /// How many rungs there are: those of the whole light, then those of its parts.
+    pub fn rungs(&self) -> usize {
+        self.rungs.len()
     }
 
     /// Ends a step: who has nothing else to hear learns that the light is still right.

@@ -29,6 +29,9 @@ pub struct HostConfig {
     /// Streams of the same light under different budgets, most bits in any second; `None` is without one. A viewer gets the richest that is within
     /// what it asked for, or else the leanest. Default: one without a budget.
     pub rungs: Vec<Option<u64>>,
+    /// Instances of each part that the light can be had in, where streams are shared ([`super::Host::next_shared`]): as many more rungs, after those of
+    /// `rungs`. At most [`crate::MAX_PARTS`]. Default: none.
+    pub parts: Vec<Vec<u32>>,
     /// Whether scene time runs at the start. Default true.
     pub playing: bool,
 }
@@ -45,6 +48,7 @@ impl Default for HostConfig {
             window_us: 500_000,
             access: Access::default(),
             rungs: vec![None],
+            parts: Vec::new(),
             playing: true,
         }
     }
@@ -160,6 +164,7 @@ pub struct HostCounts {
 impl Tick {
     pub(super) fn head(&self, made_us: u64) -> LightHead {
         LightHead {
+            part: None,
             stamp_us: self.stamp_us,
             made_us: made_us.max(self.stamp_us),
             scene_us: self.scene_us,

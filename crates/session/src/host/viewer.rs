@@ -188,6 +188,10 @@ impl Viewer {
             events_per_s: config.events_per_s,
             clock_us: now_us,
             unix_us: unix_us + now_us.saturating_sub(since_us),
+            parts: match self.is_observer {
+                true => config.parts.iter().map(|part| ranges(part)).collect(),
+                false => Vec::new(),
+            },
         }));
     }
 
@@ -369,4 +373,16 @@ impl Sent {
             self.sending = None;
         }
     }
+}
+
+/// Ascending numbers as ranges: the first of each, and the one after its last.
+fn ranges(numbers: &[u32]) -> Vec<[u32; 2]> {
+    let mut ranges: Vec<[u32; 2]> = Vec::new();
+    for &number in numbers {
+        match ranges.last_mut() {
+            Some([_, end]) if *end == number => *end = number.saturating_add(1),
+            _ => ranges.push([number, number.saturating_add(1)]),
+        }
+    }
+    ranges
 }

@@ -255,7 +255,7 @@ impl Drill {
                 }
             };
             match news {
-                Ok(News::Light(frame)) if !frame.is_empty() => peer.apply(&frame),
+                Ok(News::Light { frame, .. }) if !frame.is_empty() => peer.apply(&frame),
                 Ok(News::Welcome(false)) => peer.subscriber.outdate(),
                 Ok(_) => {}
                 // A change that was built on another state than the one held cannot be told from a right one by a viewer alone.

@@ -78,7 +78,7 @@ impl Watcher {
     fn take(&mut self, messages: &[Arc<[u8]>], now_us: u64) {
         for message in messages {
             self.bytes += message.len();
-            if let News::Light(frame) = self.guest.receive_bytes(message, now_us).unwrap()
+            if let News::Light { frame, .. } = self.guest.receive_bytes(message, now_us).unwrap()
                 && !frame.is_empty()
             {
                 let result = self.subscriber.receive(&frame);

@@ -1,7 +1,7 @@
 //! Frames → the publisher's store.
 
 use dapple_store::charts::Cuts;
-use dapple_store::points::{BentChange, PointStore, StoreError};
+use dapple_store::points::{BentChange, LayoutError, PointStore, StoreError};
 
 use crate::codec::{
     Changes, DecodeError, DecodedLayout, DecodedSets, DeltaParts, FrameHeader, FrameKind, Limits, Near,
@@ -73,6 +73,9 @@ pub enum ReceiveError {
         /// Hash in the snapshot.
         found: [u8; 32],
     },
+    /// A part's points do not fit those of the others: it has instances of theirs, or points of another density.
+    #[error("receive: a part does not fit the others: {0}")]
+    Misfit(#[from] LayoutError),
 }
 
 impl ReceiveError {
@@ -81,7 +84,7 @@ impl ReceiveError {
     pub fn snapshot_helps(&self) -> bool {
         match self {
             ReceiveError::NeedSnapshot { .. } => true,
-            ReceiveError::WrongScene { .. } => false,
+            ReceiveError::WrongScene { .. } | ReceiveError::Misfit(_) => false,
             ReceiveError::Decode(error) => matches!(
                 error,
                 DecodeError::Truncated { .. }

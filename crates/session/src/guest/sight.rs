@@ -1,0 +1,193 @@
+//! Which parts of the light a viewer needs: those with something in its view, or near it.
+
+use std::sync::Arc;
+
+use dapple_scene::glam::Vec3;
+use dapple_scene::{Aabb, Edits, Pose, Scene};
+
+use crate::LookCamera;
+
+/// What the view is wider by on each side, radians: a camera that turns finds light there.
+const WIDER: f32 = 0.26;
+
+/// What lies this near counts as seen, metres: a camera that goes back sees it soon.
+const NEAR_M: f32 = 1.0;
+
+/// A part that is seen no more is kept for so long, microseconds: who looks about does not ask for it again and again.
+const KEPT_US: u64 = 5_000_000;
+
+/// Tells which parts have something in view.
+pub(super) struct Sight {
+    scene: Arc<Scene>,
+    /// Boxes of meshes at rest, in mesh space, with room for what their morph targets do at weights of 1.
+    boxes: Vec<Aabb>,
+    /// Instances of each part, as ranges, and when it was seen last.
+    parts: Vec<(Vec<[u32; 2]>, Option<u64>)>,
+}
+
+impl Sight {
+    /// Of parts that have these instances; numbers that the scene does not have are nothing.
+    pub(super) fn new(scene: &Arc<Scene>, parts: &[Vec<[u32; 2]>]) -> Sight {
+        let boxes = scene.meshes.iter().map(|mesh| {
+            let reach = mesh
+                .morph_targets
+                .iter()
+                .map(|target| target.positions.iter().map(|offset| offset.length()).fold(0.0, f32::max));
+            Aabb::from_points(mesh.positions.iter().copied()).inflated(reach.sum())
+        });
+        let parts = parts.iter().map(|ranges| (ranges.clone(), None)).collect();
+        Sight { scene: scene.clone(), boxes: boxes.collect(), parts }
+    }
+
+    /// The parts that are needed from now on, ascending.
+    pub(super) fn parts(&mut self, camera: &LookCamera, time_s: f64, edits: &Edits, now_us: u64) -> Vec<u8> {
+        let pose = self.scene.pose_undeformed_edited(time_s, edits);
+        let cone = Cone::of(camera);
+        let mut parts = std::mem::take(&mut self.parts);
+        for (ranges, seen_us) in &mut parts {
+            let instances = self.scene.instances.len() as u32;
+            let mut all = ranges.iter().flat_map(|&[first, end]| first..end.min(instances));
+            if all.any(|instance| cone.may_see(&self.bounds_world(&pose, instance as usize))) {
+                *seen_us = Some(now_us);
+            }
+        }
+        self.parts = parts;
+        let kept = |seen_us: &Option<u64>| seen_us.is_some_and(|at| now_us.saturating_sub(at) <= KEPT_US);
+        let numbered = (0..=u8::MAX).zip(&self.parts);
+        numbered.filter(|(_, (_, seen_us))| kept(seen_us)).map(|(number, _)| number).collect()
+    }
+
+    /// A box that an instance is within, empty if it is not there. Visits no vertex.
+    fn bounds_world(&self, pose: &Pose, instance: usize) -> Aabb {
+        let posed = &pose.instances[instance];
+        if !posed.is_there() {
+            return Aabb::EMPTY;
+        }
+        let Some((mesh, skin)) = self.scene.instances.get(instance).map(|i| (i.mesh as usize, i.skin)) else {
+            return Aabb::EMPTY;
+        };
+        match skin {
+            None => self.boxes[mesh].transformed(&posed.world_from_mesh),
+            // A vertex lies between the places that its joints bring it to.
+            Some(skin) => {
+                let joints = self.scene.world_from_bind(pose, skin as usize);
+                joints.iter().fold(Aabb::EMPTY, |all, joint| all.union(self.boxes[mesh].transformed(joint)))
+            }
+        }
+    }
+}
+
+/// What a camera sees, widened: the space before up to four planes through its eye.
+struct Cone {
+    eye: Vec3,
+    /// Normals of the planes, to the inside.
+    inward: Vec<Vec3>,
+}
+
+impl Cone {
+    fn of(camera: &LookCamera) -> Cone {
+        let axes = camera.posed().world_from_view.matrix3;
+        let [right, up, back] = [axes.x_axis, axes.y_axis, axes.z_axis].map(Vec3::from);
+        let half_y = 0.5 * camera.yfov;
+        let half_x = (half_y.tan() * camera.aspect).atan();
+        let mut inward = Vec::new();
+        for (side, half) in [(right, half_x), (up, half_y)] {
+            let half = half + WIDER;
+            // From there on it sees more than a half space.
+            if half < std::f32::consts::FRAC_PI_2 {
+                let ahead = -back * half.sin();
+                inward.extend([ahead + side * half.cos(), ahead - side * half.cos()]);
+            }
+        }
+        Cone { eye: camera.eye.into(), inward }
+    }
+
+    /// False only where nothing of the box is seen, or near the eye.
+    fn may_see(&self, bounds: &Aabb) -> bool {
+        if bounds.is_empty() {
+            return false;
+        }
+        let (center, half) = (bounds.center(), 0.5 * (bounds.max - bounds.min));
+        let farthest = |normal: &Vec3| (center - self.eye).dot(*normal) + half.dot(normal.abs());
+        self.inward.iter().all(|normal| farthest(normal) >= -NEAR_M)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dapple_scene::{Edit, NoFiles, Placement, builtin};
+
+    fn camera(eye: [f32; 3], forward: [f32; 3]) -> LookCamera {
+        LookCamera { eye, forward, up: [0.0, 1.0, 0.0], yfov: 1.0, aspect: 1.5 }
+    }
+
+    fn one_each(scene: &Scene) -> Vec<Vec<[u32; 2]>> {
+        (0..scene.instances.len() as u32).map(|instance| vec![[instance, instance + 1]]).collect()
+    }
+
+    fn load(name: &str) -> Arc<Scene> {
+        let glb = builtin::glb(name, 0.1).unwrap();
+        Arc::new(dapple_scene::load("test.glb", &glb, &NoFiles).unwrap())
+    }
+
+    /// Every instance of which a vertex is in the picture must be in a part that is asked for.
+    #[test]
+    fn what_is_in_the_picture_is_asked_for() {
+        let mut asked = (0, 0);
+        for name in ["lab", "atrium", "walkers"] {
+            let Ok(glb) = builtin::glb(name, 0.1) else { continue };
+            let scene = Arc::new(dapple_scene::load("test.glb", &glb, &NoFiles).unwrap());
+            let mut parts = one_each(&scene);
+            parts.truncate(crate::MAX_PARTS);
+            let edits = Edits::new(&scene);
+            let bounds = scene.bounds_world(&scene.pose(0.0));
+            for turn in 0..12 {
+                let (angle, time_s) = (f64::from(turn) * 0.52, f64::from(turn) * 0.7);
+                let forward = [angle.cos() as f32, -0.1, angle.sin() as f32];
+                let camera = camera(bounds.center().to_array(), forward);
+                let seen = Sight::new(&scene, &parts).parts(&camera, time_s, &edits, 1);
+                asked = (asked.0 + seen.len(), asked.1 + parts.len());
+                let pose = scene.pose(time_s);
+                let view = camera.posed().view_from_world();
+                for instance in 0..parts.len() {
+                    let world = pose.instances[instance].world_from_mesh;
+                    let is_seen = scene.vertex_positions(&pose, instance).iter().any(|position| {
+                        let at = view.transform_point3(world.transform_point3(*position));
+                        let tan = (0.5 * camera.yfov).tan() * -at.z;
+                        at.z < 0.0 && at.y.abs() < tan && at.x.abs() < tan * camera.aspect
+                    });
+                    assert!(
+                        !is_seen || seen.contains(&(instance as u8)),
+                        "{name}: {instance} at turn {turn}"
+                    );
+                }
+            }
+        }
+        assert!(asked.1 > 0 && asked.0 * 4 < asked.1 * 3, "{asked:?}: all is asked for anyway");
+    }
+
+    #[test]
+    fn parts_are_kept_for_a_while_and_follow_what_moves() {
+        let scene = load("cornell");
+        let mut sight = Sight::new(&scene, &one_each(&scene));
+        let mut edits = Edits::new(&scene);
+        let far = |x: f32| Placement {
+            translation: [x, 0.0, 0.0],
+            rotation: [0.0, 0.0, 0.0, 1.0],
+            scale: [1.0; 3],
+        };
+        let node = scene.instances[1].node;
+        edits.apply(&scene, &Edit::Place { node, placement: far(1e4) }).unwrap();
+        let (there, away) =
+            (camera([9.9e3, 0.0, 0.0], [1.0, 0.0, 0.0]), camera([9e3, 0.0, 0.0], [0.0, 1.0, 0.1]));
+        assert_eq!(sight.parts(&there, 0.0, &edits, 0), [1]);
+        assert_eq!(sight.parts(&away, 0.0, &edits, KEPT_US), [1]);
+        assert!(sight.parts(&away, 0.0, &edits, KEPT_US + 1).is_empty());
+        edits.apply(&scene, &Edit::Remove { instance: 1 }).unwrap();
+        assert!(sight.parts(&there, 0.0, &edits, 2 * KEPT_US + 2).is_empty());
+        // What a host says of instances that there are not is nothing to fall over.
+        let mut odd = Sight::new(&scene, &[vec![[5, 2], [1 << 30, u32::MAX]], vec![]]);
+        assert!(odd.parts(&there, 0.0, &edits, 0).is_empty());
+    }
+}

@@ -1,0 +1,193 @@
+//! Light that comes in parts, each from a publisher of its own: which instances have points in each of them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use dapple_store::charts::Cuts;
+use dapple_store::points::{BentChange, Change, LayoutError, PackedNormal, PointLayout, PointStore};
+
+use super::{Applied, ReceiveError, Subscriber};
+use crate::codec::{Limits, ValueChange};
+
+/// A subscriber of several publishers that puts their stores together. Parts come in any order, and whichever have come make the whole.
+#[derive(Clone, Debug)]
+pub struct Parts {
+    expected_scene_hash: Option<[u8; 32]>,
+    limits: Limits,
+    parts: BTreeMap<u32, Part>,
+    whole: PointStore,
+    cuts: Cuts,
+    bent_changes: Vec<BentChange>,
+}
+
+/// One publisher's light.
+#[derive(Clone, Debug)]
+struct Part {
+    subscriber: Subscriber,
+    /// Its instances that have points in the whole, ascending.
+    instances: Vec<u32>,
+}
+
+impl Parts {
+    /// Holds nothing. The scene's hash and the limits are those of each part, as in [`Subscriber::new`].
+    pub fn new(expected_scene_hash: Option<[u8; 32]>, limits: Limits) -> Parts {
+        Parts {
+            expected_scene_hash,
+            limits,
+            parts: BTreeMap::new(),
+            whole: PointStore::default(),
+            cuts: Cuts::default(),
+            bent_changes: Vec::new(),
+        }
+    }
+
+    /// Takes a complete frame of a part. What it did is said of the whole: indices are those of [`Parts::store`].
+    ///
+    /// # Errors
+    /// The frame does not fit what is held, which is as it was. After [`ReceiveError::Misfit`] the part's next frame must be a snapshot.
+    pub fn receive(&mut self, part: u32, frame: &[u8]) -> Result<Applied, ReceiveError> {
+        self.bent_changes.clear();
+        let new = || Part {
+            subscriber: Subscriber::new(self.expected_scene_hash, self.limits),
+            instances: Vec::new(),
+        };
+        let subscriber = &mut self.parts.entry(part).or_insert_with(new).subscriber;
+        match subscriber.receive(frame)? {
+            Applied::Ignored(reason) => Ok(Applied::Ignored(reason)),
+            Applied::Changes(changes) => Ok(Applied::Changes(self.change(part, &changes))),
+            // The part says which of its sets differ; the others stay in the whole as they are.
+            Applied::Sets { removed, added, changes } => {
+                let changes = self.replace(part, &removed, &added, changes)?;
+                Ok(Applied::Sets { removed, added, changes })
+            }
+            Applied::NewLayout => {
+                let is_first = self.whole.layout().sets().is_empty();
+                let removed = self.parts[&part].instances.clone();
+                let added = instances(self.parts[&part].subscriber.store());
+                self.replace(part, &removed, &added, Vec::new())?;
+                Ok(if is_first {
+                    Applied::NewLayout
+                } else {
+                    Applied::Sets { removed, added, changes: Vec::new() }
+                })
+            }
+        }
+    }
+
+    /// The next frame of a part is of another publisher: it must be a snapshot, of whatever group. What came before stays until then.
+    pub fn begin(&mut self, part: u32) {
+        if let Some(part) = self.parts.get_mut(&part) {
+            part.subscriber.forget();
+        }
+    }
+
+    /// What is held of any part belongs to other streams from now on, as in [`Subscriber::outdate`].
+    pub fn outdate(&mut self) {
+        for part in self.parts.values_mut() {
+            part.subscriber.outdate();
+        }
+    }
+
+    /// Everything that has come, if anything has.
+    pub fn store(&self) -> Option<&PointStore> {
+        Some(&self.whole).filter(|store| !store.layout().sets().is_empty())
+    }
+
+    /// Which points do not count at which texels; empty where publishers send none.
+    pub fn cuts(&self) -> &Cuts {
+        &self.cuts
+    }
+
+    /// As [`Subscriber::bent_changes`], of the whole.
+    pub fn bent_changes(&self) -> &[BentChange] {
+        &self.bent_changes
+    }
+
+    /// What has come of one part.
+    pub fn part(&self, part: u32) -> Option<&Subscriber> {
+        self.parts.get(&part).map(|part| &part.subscriber)
+    }
+
+    /// Bytes held beside the whole, by capacity or, of stores, by their points.
+    pub fn bytes(&self) -> usize {
+        const A_PLACE: usize = size_of::<[u32; 3]>() + size_of::<PackedNormal>();
+        let points = |store: &PointStore| store.value_bytes() + store.layout().len() * A_PLACE;
+        let of = |part: &Part| part.subscriber.store().map_or(0, points) + part.subscriber.bytes();
+        self.parts.values().map(of).sum()
+    }
+
+    /// Brings the whole to a part's new values.
+    fn change(&mut self, part: u32, changes: &[ValueChange]) -> Vec<ValueChange> {
+        let part = &self.parts[&part].subscriber;
+        let layout = part.store().expect("changes are of a store").layout();
+        let mut place = places(layout, self.whole.layout());
+        let changes: Vec<ValueChange> = changes
+            .iter()
+            .filter_map(|change| Some(ValueChange { point: place(change.point)?, ..*change }))
+            .collect();
+        let mut place = places(layout, self.whole.layout());
+        let bent = part.bent_changes().iter();
+        self.bent_changes =
+            bent.filter_map(|change| Some(BentChange { point: place(change.point)?, ..*change })).collect();
+        let news: Vec<Change> =
+            changes.iter().map(|change| Change { point: change.point, visibility: change.new }).collect();
+        self.whole.apply(&news).expect("they are points of the whole");
+        self.whole.apply_bent(&self.bent_changes).expect("the whole has what its parts have");
+        changes
+    }
+
+    /// Puts sets of a part in the place of others of it; `changes` are those of its points that stay.
+    fn replace(
+        &mut self,
+        number: u32,
+        removed: &[u32],
+        added: &[u32],
+        changes: Vec<ValueChange>,
+    ) -> Result<Vec<ValueChange>, ReceiveError> {
+        let replaced = self.try_replace(number, removed, added);
+        if let Err(error) = replaced {
+            // What it says next would not fit either: it begins anew.
+            self.begin(number);
+            return Err(error.into());
+        }
+        Ok(self.change(number, &changes))
+    }
+
+    fn try_replace(&mut self, number: u32, removed: &[u32], added: &[u32]) -> Result<(), LayoutError> {
+        let part = &self.parts[&number];
+        let of_part = part.subscriber.store().expect("it has just come");
+        let whole = if self.whole.layout().sets().is_empty() {
+            of_part.clone()
+        } else {
+            let coming = Arc::new(of_part.layout().only(added));
+            self.whole.with_sets(removed, &PointStore::default().carried(coming, of_part))?
+        };
+        let cuts = part.subscriber.cuts().map(|cuts| cuts.only(added)).unwrap_or_default();
+        let all = instances(Some(of_part));
+        self.cuts = self.cuts.with_sets(removed, &cuts);
+        self.whole = whole;
+        self.parts.get_mut(&number).expect("it was there").instances = all;
+        Ok(())
+    }
+}
+
+fn instances(store: Option<&PointStore>) -> Vec<u32> {
+    store.map_or_else(Vec::new, |store| store.layout().sets().iter().map(|set| set.instance).collect())
+}
+
+/// Where in the whole the points of a part are, to be asked in their order.
+fn places(part: &PointLayout, whole: &PointLayout) -> impl FnMut(u32) -> Option<u32> + use<> {
+    let first_of = |instance| whole.set_of_instance(instance).map(|set| set.first);
+    let sets: Vec<_> = part
+        .sets()
+        .iter()
+        .map(|set| (set.first..set.first + set.len() as u32, first_of(set.instance)))
+        .collect();
+    let mut at = 0;
+    move |point| {
+        while point >= sets[at].0.end {
+            at += 1;
+        }
+        sets[at].1.map(|first| first + point - sets[at].0.start)
+    }
+}
