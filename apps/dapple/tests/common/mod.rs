@@ -7,6 +7,8 @@ pub(crate) mod command;
 pub(crate) mod http;
 pub(crate) mod live;
 pub(crate) mod made;
+#[cfg(all(unix, feature = "moq"))]
+pub(crate) mod moq;
 pub(crate) mod relay;
 
 use std::path::{Path, PathBuf};
