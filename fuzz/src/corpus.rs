@@ -32,18 +32,20 @@ const VIEWER_LINES: &str = r#"{"type":"event","number":1,"event":{"event":"pause
 {"type":"event","number":10,"event":{"event":"edit","change":{"edit":"reset"}}}
 {"type":"look","number":1,"camera":{"eye":[0,1,2],"forward":[0,0,-1],"up":[0,1,0],"yfov":0.9,"aspect":1.5},"held":{"group":1,"epoch":2},"state":3,"heard_us":4,"waited_us":5,"came":6,"lost":0}
 {"type":"event","number":11,"event":{"event":"edit","change":{"edit":"remove","instance":99}}}
+{"type":"look","number":3,"parts":[0,1]}
 {"type":"bye"}
 {"type":"hello","protocol":1,"wire":4,"scene":"00","token":"t","key":"k","bits_per_s":500000}"#;
 
 /// What hosts say, one of each.
-const HOST_LINES: &str = r#"{"type":"welcome","protocol":1,"viewer":1,"key":"k","role":"interact","hz":30.0,"heard":0,"goes_on":false,"bits_per_s":null,"events_per_s":60,"clock_us":1,"unix_us":2}
+const HOST_LINES: &str = r#"{"type":"welcome","protocol":1,"viewer":1,"key":"","role":"view","hz":30.0,"heard":0,"goes_on":false,"bits_per_s":null,"events_per_s":60,"clock_us":1,"unix_us":2,"parts":[[[0,2]],[[3,1],[2,4294967295]],[]]}
+{"type":"welcome","protocol":1,"viewer":1,"key":"k","role":"interact","hz":30.0,"heard":0,"goes_on":false,"bits_per_s":null,"events_per_s":60,"clock_us":1,"unix_us":2}
 {"type":"state","version":1,"clock":{"playing":true,"time_us":0,"at_us":0},"edits":{"placed":[],"removed":[],"lights":[]}}
 {"type":"changes","from":1,"to":2,"clock":{"playing":false,"time_us":5,"at_us":6},"edits":[{"edit":"remove","instance":0}]}
 {"type":"heard","number":3}
 {"type":"rejected","number":4,"message":"no"}
 {"type":"status","viewers":2,"step_us":3,"queue_us":4,"round_trip_us":5,"ray_budget":6,"waiting":7}
 {"type":"refused","reason":"closing","message":"later"}
-{"protocol":1,"wire":4,"scene":"00","streams":[{},{"bits_per_s":500000}]}"#;
+{"protocol":1,"wire":4,"scene":"00","streams":[{},{"bits_per_s":500000}],"parts":3}"#;
 
 /// What hosts and workers say to each other, one of each.
 const WORK_LINES: &str = r#"{"type":"hello","protocol":1,"wire":4,"scene":"00","shard":0,"of":2,"token":"t"}
@@ -189,6 +191,8 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
     }
     let mut light = dapple_session::LightHead { made_us: 7, ..Default::default() }.messages(&[1, 2, 3]);
     seeds.push(("live_session", "light".to_owned(), light.swap_remove(0).to_vec()));
+    let head = dapple_session::LightHead { part: Some(1), made_us: 7, ..Default::default() };
+    seeds.push(("live_session", "part".to_owned(), head.messages(&[1, 2, 3]).swap_remove(0).to_vec()));
 
     for (name, json) in [("targets", TARGETS_JSON), ("rotations", ROTATIONS_JSON)] {
         seeds.push(("read_camera_path", name.to_owned(), json.as_bytes().to_vec()));

@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 
 use dapple_stream::codec::seal;
-use dapple_stream::{Applied, FrameHeader, FrameKind, Limits, Subscriber};
+use dapple_stream::{Applied, FrameHeader, FrameKind, Limits, Parts, Subscriber};
 
 use crate::corpus;
 use crate::input::fingerprint;
@@ -41,7 +41,40 @@ pub fn decode_frame(data: &[u8]) {
     }
 }
 
+/// As a part of light of which another, or the same, has come before.
+fn receive_part(frame: &[u8]) {
+    let mut start = Parts::new(None, LIMITS);
+    start.receive(0, &fingerprint(&corpus::sample())).expect("a sound frame");
+    for part in [0, 1] {
+        let mut parts = start.clone();
+        match parts.receive(part, frame) {
+            Ok(Applied::Ignored(_)) | Err(_) => assert!(parts.store() == start.store()),
+            Ok(_) => {
+                // What the part has, the whole has.
+                let held = parts.part(part).and_then(Subscriber::store).expect("it was applied");
+                for set in held.layout().sets() {
+                    let whole = parts.store().expect("it was applied");
+                    let place = whole.layout().set_of_instance(set.instance).expect("it came");
+                    let values = |first: u32| first as usize..first as usize + set.len();
+                    assert_eq!(place.positions, set.positions);
+                    assert_eq!(whole.visibility()[values(place.first)], held.visibility()[values(set.first)]);
+                    if held.bent().is_some() {
+                        let bent = |point: u32| {
+                            (
+                                whole.bent_of((place.first + point) as usize),
+                                held.bent_of((set.first + point) as usize),
+                            )
+                        };
+                        assert!((0..set.len() as u32).map(bent).all(|(whole, held)| whole == held));
+                    }
+                }
+            }
+        }
+    }
+}
+
 fn receive(frame: &[u8]) {
+    receive_part(frame);
     for start in [&Subscriber::new(None, LIMITS), &*HOLDING, &*HOLDING_BENT] {
         let mut subscriber = start.clone();
         match subscriber.receive(frame) {

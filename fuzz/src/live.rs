@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, LazyLock};
 
+use dapple_scene::glam::Vec3;
 use dapple_scene::{Instance, NoFiles, Scene};
 use dapple_session::host::{Arrival, Host, HostConfig, Next, hex};
 use dapple_session::work::{FromWorker, ToWorker};
@@ -19,7 +20,7 @@ static SCENE: LazyLock<Arc<Scene>> = LazyLock::new(|| {
     Arc::new(scene)
 });
 
-/// Lines of `data` go to a host as a viewer's messages, and to a viewer as a host's: text as it is, lines that begin with `L` as light too.
+/// Lines of `data` go to a host as a viewer's messages, and to a viewer as a host's: text as it is, lines that begin with `L` or `P` as light too.
 /// Nothing may panic; a message that is understood is, said again, the same; the host's edits fit the scene throughout, and a viewer that hears
 /// the host ends with its state.
 pub fn live_session(data: &[u8]) {
@@ -43,6 +44,8 @@ pub fn live_session(data: &[u8]) {
     listener.connected(0);
     let mut victim = Guest::new(scene.clone(), GuestConfig::default());
     victim.connected(0);
+    // It sees something, so that it says which parts of the light it needs.
+    victim.look(&dapple_scene::PosedCamera::look_at(Vec3::new(0.0, 1.0, 5.0), Vec3::ZERO, 1.0), 1.5);
 
     let mut link = host.join(&hello, arrival("0"), 0).expect("it fits");
     for (number, line) in data.split(|byte| *byte == b'\n').take(64).enumerate() {

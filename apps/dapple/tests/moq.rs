@@ -11,8 +11,8 @@ use common::command::fail;
 use common::live::{Served, Viewer};
 use common::moq::{At, MoqViewer, config, place, runtime};
 use common::relay::Relay;
-use dapple_moq::moq_net::{Timestamp, origin};
 use dapple_moq::Names;
+use dapple_moq::moq_net::{Timestamp, origin};
 use dapple_session::{Event, GuestConfig, GuestError, Reason, Role};
 use tempfile::TempDir;
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Aabb, Edits, Pose, Scene};
 
-use crate::LookCamera;
+use crate::{LookCamera, MAX_PARTS};
 
 /// What the view is wider by on each side, radians: a camera that turns finds light there.
 const WIDER: f32 = 0.26;
@@ -21,12 +21,14 @@ pub(super) struct Sight {
     scene: Arc<Scene>,
     /// Boxes of meshes at rest, in mesh space, with room for what their morph targets do at weights of 1.
     boxes: Vec<Aabb>,
-    /// Instances of each part, as ranges, and when it was seen last.
-    parts: Vec<(Vec<[u32; 2]>, Option<u64>)>,
+    /// The part of each instance, if it has one.
+    part_of: Vec<Option<u8>>,
+    /// When each part was seen last.
+    seen_us: Vec<Option<u64>>,
 }
 
 impl Sight {
-    /// Of parts that have these instances; numbers that the scene does not have are nothing.
+    /// Of parts that have these instances, as ranges. Numbers that the scene does not have are nothing, nor is what comes after as many as it has.
     pub(super) fn new(scene: &Arc<Scene>, parts: &[Vec<[u32; 2]>]) -> Sight {
         let boxes = scene.meshes.iter().map(|mesh| {
             let reach = mesh
@@ -35,26 +37,33 @@ impl Sight {
                 .map(|target| target.positions.iter().map(|offset| offset.length()).fold(0.0, f32::max));
             Aabb::from_points(mesh.positions.iter().copied()).inflated(reach.sum())
         });
-        let parts = parts.iter().map(|ranges| (ranges.clone(), None)).collect();
-        Sight { scene: scene.clone(), boxes: boxes.collect(), parts }
+        let count = scene.instances.len() as u32;
+        let mut part_of = vec![None; count as usize];
+        let numbered = (0..=u8::MAX).zip(parts);
+        let ranges = numbered.flat_map(|(number, ranges)| ranges.iter().map(move |range| (number, range)));
+        let all = ranges.flat_map(|(number, &[first, end])| {
+            (first..end.min(count)).map(move |instance| (number, instance as usize))
+        });
+        for (number, instance) in all.take(part_of.len()) {
+            part_of[instance] = Some(number);
+        }
+        let seen_us = vec![None; parts.len().min(MAX_PARTS)];
+        Sight { scene: scene.clone(), boxes: boxes.collect(), part_of, seen_us }
     }
 
     /// The parts that are needed from now on, ascending.
     pub(super) fn parts(&mut self, camera: &LookCamera, time_s: f64, edits: &Edits, now_us: u64) -> Vec<u8> {
         let pose = self.scene.pose_undeformed_edited(time_s, edits);
         let cone = Cone::of(camera);
-        let mut parts = std::mem::take(&mut self.parts);
-        for (ranges, seen_us) in &mut parts {
-            let instances = self.scene.instances.len() as u32;
-            let mut all = ranges.iter().flat_map(|&[first, end]| first..end.min(instances));
-            if all.any(|instance| cone.may_see(&self.bounds_world(&pose, instance as usize))) {
-                *seen_us = Some(now_us);
+        for instance in 0..self.part_of.len() {
+            let Some(part) = self.part_of[instance].map(usize::from) else { continue };
+            if self.seen_us[part] != Some(now_us) && cone.may_see(&self.bounds_world(&pose, instance)) {
+                self.seen_us[part] = Some(now_us);
             }
         }
-        self.parts = parts;
         let kept = |seen_us: &Option<u64>| seen_us.is_some_and(|at| now_us.saturating_sub(at) <= KEPT_US);
-        let numbered = (0..=u8::MAX).zip(&self.parts);
-        numbered.filter(|(_, (_, seen_us))| kept(seen_us)).map(|(number, _)| number).collect()
+        let numbered = (0..=u8::MAX).zip(&self.seen_us);
+        numbered.filter(|(_, seen_us)| kept(seen_us)).map(|(number, _)| number).collect()
     }
 
     /// A box that an instance is within, empty if it is not there. Visits no vertex.
