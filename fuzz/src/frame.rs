@@ -2,6 +2,7 @@
 
 use std::sync::LazyLock;
 
+use dapple_store::points::{PointLayout, PointSet, PointStore};
 use dapple_stream::codec::seal;
 use dapple_stream::{Applied, FrameHeader, FrameKind, Limits, Parts, Subscriber};
 
@@ -41,11 +42,25 @@ pub fn decode_frame(data: &[u8]) {
     }
 }
 
-/// As a part of light of which another, or the same, has come before.
+/// Holds two parts: the sample store, and the same points of other instances, with bent normals.
+static HOLDING_PARTS: LazyLock<Parts> = LazyLock::new(|| {
+    let mut parts = Parts::new(None, LIMITS);
+    parts.receive(0, &fingerprint(&corpus::sample())).expect("a sound frame");
+    let sample = corpus::bent_sample();
+    let layout = sample.layout();
+    let sets = layout.sets().iter().cloned().map(|set| PointSet { instance: set.instance + 10, ..set });
+    let layout =
+        PointLayout::new(layout.quantum_m(), layout.spacing_m(), sets.collect()).expect("sound sets");
+    let other = PointStore::new(layout.into(), sample.visibility().to_vec()).expect("a value a point");
+    let other = other.with_bent(sample.bent().expect("it has some").clone()).expect("two bytes a point");
+    parts.receive(1, &fingerprint(&other)).expect("a sound frame");
+    parts
+});
+
+/// As a part of light, beside others or in the place of one.
 fn receive_part(frame: &[u8]) {
-    let mut start = Parts::new(None, LIMITS);
-    start.receive(0, &fingerprint(&corpus::sample())).expect("a sound frame");
-    for part in [0, 1] {
+    let start = &*HOLDING_PARTS;
+    for part in [0, 1, 2] {
         let mut parts = start.clone();
         match parts.receive(part, frame) {
             Ok(Applied::Ignored(_)) | Err(_) => assert!(parts.store() == start.store()),

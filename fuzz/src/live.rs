@@ -42,7 +42,7 @@ pub fn live_session(data: &[u8]) {
     let watcher = host.join(&hello, arrival("watcher"), 0).expect("it fits");
     let mut listener = Guest::new(scene.clone(), GuestConfig::default());
     listener.connected(0);
-    let mut victim = Guest::new(scene.clone(), GuestConfig::default());
+    let mut victim = Guest::new(scene.clone(), GuestConfig { in_parts: true, ..GuestConfig::default() });
     victim.connected(0);
     // It sees something, so that it says which parts of the light it needs.
     victim.look(&dapple_scene::PosedCamera::look_at(Vec3::new(0.0, 1.0, 5.0), Vec3::ZERO, 1.0), 1.5);

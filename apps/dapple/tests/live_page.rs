@@ -8,7 +8,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 #[cfg(all(unix, feature = "moq"))]
-use common::{live::Served, relay::Relay};
+use common::live::{SMALL, Served};
+#[cfg(all(unix, feature = "moq"))]
+use common::relay::Relay;
 use serde_json::{Value, json};
 
 /// Node.js, the browser, the driver's script and the built page.
@@ -95,11 +97,14 @@ fn pages_over_webtransport_see_what_those_over_a_websocket_see() {
         arguments.extend(["--relay", &relay.url]);
     }
     let served = Served::start(&folder, 0, &arguments);
+    let port = served.port.to_string();
+    let again = [&SMALL[..], &["--port", &port], &arguments[..3]].concat();
     // Nobody answers there: it is held, and not listened to.
     let dead = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
     let plan = json!({
         "browser": browser, "url": format!("http://127.0.0.1:{}/", served.port), "out": folder,
         "port": dead.local_addr().unwrap().port(), "relay": relay.as_ref().map(|relay| &relay.url),
+        "server": served.child.id(), "again": [env!("CARGO_BIN_EXE_dapple"), again],
     });
     let facts = drive(&node, &driver.with_file_name("moq.mjs"), &folder, &plan);
     assert_eq!(facts["transports"], json!(["WebTransport", "WebTransport", "WebSocket"]), "{facts:#}");
@@ -115,6 +120,7 @@ fn pages_over_webtransport_see_what_those_over_a_websocket_see() {
     if relay.is_some() {
         assert_eq!(facts["relayed"], json!(["WebTransport", facts["light"][0]]), "{facts:#}");
     }
+    assert_eq!(facts["again"], "WebTransport", "{facts:#}");
 }
 
 #[test]

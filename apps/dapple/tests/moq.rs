@@ -194,7 +194,8 @@ fn who_breaks_rules_is_not_heard_and_nobody_else_notices() {
             }
             own.announce(origin::Route::default()).unwrap();
             // In the name of others, and of the host.
-            let others = [names.from_viewer(&name(77)), names.to_viewer(&name(77)), at.name.clone()];
+            let others =
+                [names.from_viewer(&name(77)), names.to_viewer(&name(77)), names.shared().to_owned()];
             let forged = others.map(|path| {
                 let broadcast = to.create_broadcast(path.as_str()).unwrap();
                 let state = broadcast.create_track("state", None).unwrap();
@@ -210,7 +211,7 @@ fn who_breaks_rules_is_not_heard_and_nobody_else_notices() {
             let until = Instant::now() + Duration::from_millis(500);
             while let Ok(Some(update)) = tokio::time::timeout_at(until.into(), announced.next()).await {
                 let path = update.prefix.as_str();
-                assert!(path == at.name || path == own_out, "it hears of {path}");
+                assert!(path == names.shared() || path == own_out, "it hears of {path}");
             }
             kept.push((connection, from, to, own, tracks, group, forged));
         }

@@ -91,7 +91,9 @@ async fn converse(
     // They end with what they drive.
     spawn_local(async { drop(time::run(from_driver).await) });
     spawn_local(async { drop(time::run(to_driver).await) });
-    let client = Client::new().with_publisher(&to).with_subscriber(from.clone());
+    // It asks for what it needs alone: others need not be told of, by the host or by a relay.
+    let readable = from.scope("", &names.rights(&wish.viewer)?.0)?;
+    let client = Client::new().with_publisher(&to).with_subscriber(readable);
     let (session, driver) = client.connect_lite(now(), transport).await?;
     spawn_local(async { drop(time::run(driver).await) });
     let (mut out, mut inbound) = {

@@ -141,8 +141,9 @@ export interface Options {
   /** Address of a live session of the scene instead (`dapple serve`), `ws:` or `wss:` by the page's own scheme. `time`,
    * `loop` and `paused` mean nothing then: time is everyone's. */
   live?: string;
-  /** Where the same session is over WebTransport, which is used where the browser has it, before `live`. */
-  moq?: MoqPlace;
+  /** Where the same session is over WebTransport, which is used where the browser has it, before `live`. A function is asked before each connection: a server
+   * that has started again is found by another name. */
+  moq?: MoqPlace | (() => MoqPlace | null | Promise<MoqPlace | null>);
   /** Default `auto`: WebTransport where there is such, else a WebSocket. */
   transport?: "auto" | "websocket";
   /** What gives the viewer its role, where the server asks for that. */

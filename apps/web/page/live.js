@@ -26,13 +26,14 @@ export class LiveLink {
   #heardAt = 0;
   #wasOpen = false;
   #applySeconds = 0;
-  // Where it is over WebTransport, and most bits a second; null for a WebSocket.
-  #moq;
+  // Finds where it is over WebTransport; null for a WebSocket.
+  #findMoq;
   #bits;
   #isMoq = false;
   // Whether it ever carried this session, and how often in a row it then could not be opened.
   #moqWorks = false;
   #moqFailures = 0;
+  #isLost = false;
   #detach = [];
   // connecting, live, reconnecting, refused, closed
   #state = "connecting";
@@ -40,11 +41,12 @@ export class LiveLink {
   #reason = null;
   #message = null;
 
-  // `moq` says where the session is over WebTransport (null for a WebSocket alone), `bits` the most a second that is wanted. `core()` gives the program's side, null once it is gone. `on` has functions: status(), light(), progress(loaded,
+  // `moq` says where the session is over WebTransport, or is asked for it before each connection (null for a WebSocket alone), `bits` the most a second that is wanted. `core()` gives the program's side, null once it is gone. `on` has functions: status(), light(), progress(loaded,
   // total), rejected(message).
   constructor(url, { moq = null, bits = 0 }, core, on) {
     this.#url = url;
-    this.#moq = moq && hasWebTransport() ? moq : null;
+    const find = typeof moq === "function" ? moq : () => moq;
+    this.#findMoq = moq && hasWebTransport() ? find : null;
     this.#bits = bits;
     this.#core = core;
     this.#on = on;
@@ -99,8 +101,8 @@ export class LiveLink {
     let socket;
     try {
       const scene = this.#core()?.liveScene();
-      this.#isMoq = this.#moq !== null && scene !== undefined;
-      socket = this.#isMoq ? new MoqSocket(this.#moq, scene, this.#bits) : new WebSocket(this.#url);
+      this.#isMoq = this.#findMoq !== null && scene !== undefined;
+      socket = this.#isMoq ? new MoqSocket(this.#place(), scene, this.#bits) : new WebSocket(this.#url);
     } catch (error) {
       const message = `${this.#url} is no address of a live session: ${error.message}`;
       // Whoever makes this knows it only once it is made.
@@ -175,11 +177,22 @@ export class LiveLink {
     }
   }
 
-  // UDP may be closed to this viewer and the page's own way open; what worked before is tried some times more.
+  // A server that starts again has another name.
+  async #place() {
+    this.#isLost = true;
+    const place = await this.#findMoq();
+    this.#isLost = false;
+    if (!place) this.#moqWorks = false;
+    return place;
+  }
+
+  // UDP may be closed to this viewer and the page's own way open; what worked before is tried some times more. While nobody says where it is, the server is
+  // gone, whichever the way.
   #givesUpMoq() {
+    if (this.#isLost && this.#moqWorks) return false;
     this.#moqFailures += 1;
     if (this.#moqWorks && this.#moqFailures < 4) return false;
-    this.#moq = null;
+    this.#findMoq = null;
     return true;
   }
 

@@ -55,8 +55,19 @@ async function settings() {
     result.bits = parseBits(query.get("bits"));
     if (!result.bits) throw new Error(`?bits=${query.get("bits")} is no number of bits a second: write 500k or 2M.`);
   }
+  if (result.moq) result.moq = moqNow(result.moq);
   if (query.has("split")) result.split = { position: Number(query.get("split")), method: query.get("other") ?? "none" };
   return result;
+}
+
+// Where the session is over WebTransport: as was just read, and from then on as the server says.
+function moqNow(first) {
+  let known = first;
+  return async () => {
+    const place = known ?? (await (await fetch("viewer.json", { cache: "no-store" })).json()).moq ?? null;
+    known = null;
+    return place;
+  };
 }
 
 function onProgress({ stage: name, loaded, total }) {

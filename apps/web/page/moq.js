@@ -18,6 +18,7 @@ async function load() {
 
 // A relay at an address of http: tells the hash of its certificate there.
 async function certified(place) {
+  if (!place) throw new Error("the server serves no MoQ");
   if (!place.url.startsWith("http:")) return place;
   const url = new URL(place.url);
   const response = await fetch(new URL("/certificate.sha256", url));
@@ -39,10 +40,10 @@ export class MoqSocket {
   onmessage = null;
   onclose = null;
 
-  /** Joins what `place` names (see MoqPlace in dapple.d.ts), with the hash of the scene that was loaded and the most bits a second that are wanted. */
+  /** Joins what `place` names (see MoqPlace in dapple.d.ts; a promise of it will do), with the hash of the scene that was loaded and the most bits a second that are wanted. */
   constructor(place, scene, bits) {
     const viewer = [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
-    Promise.all([load(), certified(place)]).then(
+    Promise.all([load(), Promise.resolve(place).then(certified)]).then(
       ([{ MoqLink }, { url, name, certificate }]) => {
         if (this.#state !== WebSocket.CONNECTING) return;
         const address = url.replace("{viewer}", viewer);

@@ -33,6 +33,7 @@ impl Core {
         let config = GuestConfig {
             token,
             bits_per_s: (bits_per_second >= 1.0).then_some(bits_per_second as u64),
+            in_parts: bits_per_second < 1.0,
             seed: seed.into(),
             ..GuestConfig::default()
         };

@@ -2,7 +2,7 @@
 //! own.
 //!
 //! ```text
-//! NAME              about, state, light/K, snapshot/K      one publisher, any number of viewers through any number of relays
+//! NAME/all          about, state, light/K, snapshot/K      one publisher, any number of viewers through any number of relays
 //! NAME/in/VIEWER    talk, looks                            a viewer who wants to be heard
 //! NAME/out/VIEWER   talk                                   what is said to it alone
 //! ```

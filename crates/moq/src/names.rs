@@ -43,6 +43,7 @@ pub(crate) fn part_snapshot(number: usize) -> String {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Names {
     base: String,
+    shared: String,
 }
 
 /// Says what is wrong with a broadcast's name, if anything is: parts of letters, digits, `.`, `_` and `-` with `/` between, 200 bytes at most.
@@ -68,12 +69,13 @@ impl Names {
     /// What is wrong with the name.
     pub fn new(name: &str) -> Result<Names, LinkError> {
         check_name(name).map_err(LinkError::Refused)?;
-        Ok(Names { base: name.to_owned() })
+        Ok(Names { base: name.to_owned(), shared: format!("{name}/all") })
     }
 
-    /// The broadcast of light and state.
+    /// The broadcast of light and state. Beside those of viewers and not above them: interest goes by prefix, and who asks for this must not be told of all
+    /// viewers.
     pub fn shared(&self) -> &str {
-        &self.base
+        &self.shared
     }
 
     /// What a viewer says.
@@ -102,7 +104,10 @@ impl Names {
     /// # Errors
     /// None, for names that were checked.
     pub fn rights(&self, viewer: &str) -> Result<(Patterns, Patterns), LinkError> {
-        Ok((patterns(&[self.base.clone(), self.to_viewer(viewer)])?, patterns(&[self.from_viewer(viewer)])?))
+        Ok((
+            patterns(&[self.shared.clone(), self.to_viewer(viewer)])?,
+            patterns(&[self.from_viewer(viewer)])?,
+        ))
     }
 }
 
@@ -137,13 +142,17 @@ mod tests {
         }
         let names = Names::new("dapple/room").unwrap();
         let (readable, writable) = names.rights("*").unwrap();
-        assert!(readable.matches("dapple/room") && readable.matches(&names.to_viewer("ab")));
-        assert!(!readable.matches(&names.from_viewer("ab")) && !readable.matches("dapple"));
+        assert!(readable.matches("dapple/room/all") && readable.matches(&names.to_viewer("ab")));
+        assert!(!readable.matches(&names.from_viewer("ab")) && !readable.matches("dapple/room"));
         assert!(writable.matches(&names.from_viewer("ab")) && !writable.matches(&names.to_viewer("ab")));
-        assert!(!writable.matches("dapple/room") && !writable.matches("dapple/room/in/a/b"));
+        assert!(!writable.matches("dapple/room/all") && !writable.matches("dapple/room/in/a/b"));
         let (one, other) = ("0f".repeat(16), "0e".repeat(16));
         let (readable, writable) = names.rights(&one).unwrap();
-        assert!(readable.matches("dapple/room") && readable.matches(&names.to_viewer(&one)));
+        assert!(readable.matches(names.shared()) && readable.matches(&names.to_viewer(&one)));
+        // What is asked for by prefix is that and nothing else.
+        let heads: Vec<&str> = readable.iter().map(|pattern| pattern.head()).collect();
+        assert!(heads.iter().all(|head| !names.from_viewer(&other).starts_with(head)), "{heads:?}");
+        assert!(heads.iter().all(|head| !names.to_viewer(&other).starts_with(head)), "{heads:?}");
         assert!(!readable.matches(&names.to_viewer(&other)) && !writable.matches(&names.from_viewer(&other)));
         assert_eq!(names.viewer_at(&names.path_of(&one)), Some(&one[..]));
         for path in ["/", "", "/dapple/room", "/dapple/room/", "/dapple/room/ab", "/dapple/other/x"] {

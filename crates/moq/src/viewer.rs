@@ -27,7 +27,7 @@ pub struct Wish {
     pub bits_per_s: Option<u64>,
     /// Its name, 32 to 64 hexadecimal digits that nobody can guess.
     pub viewer: String,
-    /// Whether it can take the light in parts, and its looks say which it needs.
+    /// Whether it can take the light in parts, and its looks say which it needs. Parts have no budget: who wants one takes the light as one.
     pub parts: bool,
 }
 
@@ -70,7 +70,7 @@ pub async fn join(
         // Said as the host would, to those too who do not ask it.
         refusal: viewer.refusal(host),
         rung,
-        parts: (wish.parts && rung == 0 && about.parts > 0).then_some((about.parts, seen)),
+        parts: (wish.parts && wish.bits_per_s.is_none() && about.parts > 0).then_some((about.parts, seen)),
         shared,
         lost: out.lost.clone(),
     };

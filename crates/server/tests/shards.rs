@@ -145,9 +145,12 @@ fn parts_taken_by_themselves_are_those_of_the_whole_to_the_bit() {
     for step in 0..14 {
         let time_s = step as f64 * 0.3;
         for (number, part) in parts.iter_mut().enumerate() {
-            let frame = part.step(time_s).unwrap().frame;
-            // Another server takes the second part's place.
             let joins = step == 0 || (number == 1 && step == 5);
+            if number == 1 && step == 5 {
+                // Another server takes the second part's place.
+                *part = start(&scene, Some(Shard { number: 1, of }));
+            }
+            let frame = part.step(time_s).unwrap().frame;
             if joins {
                 merger.begin(number as u32);
             }

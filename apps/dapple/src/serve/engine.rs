@@ -157,8 +157,9 @@ impl Engine {
             return Ok(());
         }
         let start = Instant::now();
-        // Stream 0 goes into a recording, watched or not.
-        let wants = |rung: usize| rung == 0 || watched[rung];
+        // Stream 0 goes into a recording, watched or not; of a server it is what its steps bring.
+        let always = self.recording.is_some() || matches!(light, Light::Here(_));
+        let wants = |rung: usize| watched[rung] || rung == 0 && always;
         let Made { report, frames, made_us } = light.step(&hub, &tick, looks, self.ration.rays(), &wants)?;
         let took_us = start.elapsed().as_micros() as u64;
         if matches!(light, Light::Here(_)) {

@@ -276,8 +276,11 @@ fn access(args: &ServeArgs) -> Access {
 fn parts(scene: &Scene, config: &ServerConfig, args: &ServeArgs) -> Result<Vec<Vec<u32>>> {
     // Every viewer is told of all of them as it comes.
     const MOST_INSTANCES: usize = 20_000;
+    const { assert!(Shard::MOST as usize <= dapple_session::MAX_PARTS) };
     let is_shared = args.moq.is_some() || !args.relay.is_empty();
-    let Some(of) = args.workers.filter(|of| is_shared && *of > 1) else { return Ok(Vec::new()) };
+    // A budget is that of all of it.
+    let is_offered = is_shared && config.bits_per_s.is_none();
+    let Some(of) = args.workers.filter(|of| is_offered && *of > 1) else { return Ok(Vec::new()) };
     if scene.instances.len() > MOST_INSTANCES {
         tracing::warn!(
             "the scene has more than {MOST_INSTANCES} instances: viewers take its light as one, not in parts"

@@ -56,10 +56,13 @@ pub(crate) async fn connect(
     let url: Url =
         url.parse().map_err(|error| LinkError::Refused(format!("{url} is no address: {error}")))?;
     let (from_host, to_host) = (moq_tokio::origin::spawn(), moq_tokio::origin::spawn());
+    // It asks for what it needs alone: others need not be told of, by the host or by a relay.
+    let readable = names.rights(&wish.viewer).map_err(from)?.0;
+    let readable = from_host.scope("", &readable).map_err(ended)?;
     let client = client(address.certificate.as_deref())?
         .with_reconnect(false)
         .with_publisher(&to_host)
-        .with_subscriber(from_host.clone());
+        .with_subscriber(readable);
     let connecting = async {
         let connection = client.connect(url).established().await.map_err(ended)?;
         let joined = dapple_moq::join(&from_host.consume(), &to_host, &names, &wish).await.map_err(from)?;

@@ -112,13 +112,17 @@ fn open(args: &ViewArgs) -> Result<Opening> {
                 (Some(address), _) => {
                     let bits_per_s = args.step.budget.map(|rate| rate.0);
                     let seed = u64::from(std::process::id());
+                    // A picture is taken once there is light, and all of that.
+                    let in_parts = !args.headless && bits_per_s.is_none();
+                    let address = if in_parts { address.in_parts() } else { address };
                     let config = GuestConfig {
                         token: args.token.clone().or_else(|| token_of(url)),
                         bits_per_s,
+                        in_parts,
                         seed,
                         ..GuestConfig::default()
                     };
-                    Feed::Remote(Remote::join(address.in_parts(), &scene, config)?)
+                    Feed::Remote(Remote::join(address, &scene, config)?)
                 }
                 (None, Some(pieces)) => Feed::Recorded(Player::incoming(pieces, &scene)),
                 (None, None) => Feed::None,

@@ -13,7 +13,7 @@ use tokio::sync::watch;
 use crate::live::{Address, LinkState, SharedGuest, keep};
 
 /// Most frames that wait to be applied; a window that is hidden for longer gets a snapshot when it is seen again.
-const MAX_WAITING: usize = 512;
+const MAX_WAITING: usize = 4096;
 
 /// A session that is kept up by a thread of its own until this is dropped.
 pub(super) struct Remote {

@@ -96,7 +96,7 @@ impl MoqViewer {
         getrandom::fill(&mut secret).unwrap();
         let viewer = dapple_session::host::hex(&secret);
         let connection = at.connect(&viewer).await;
-        let mut guest = Guest::new(scene.clone(), config);
+        let mut guest = Guest::new(scene.clone(), GuestConfig { in_parts, ..config });
         let hello = guest.hello();
         let wish = Wish { scene: hello.scene, bits_per_s: hello.bits_per_s, viewer, parts: in_parts };
         let names = Names::new(&at.name).unwrap();

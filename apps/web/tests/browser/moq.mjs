@@ -1,9 +1,10 @@
 // Pages that take part in a live session over WebTransport, and one beside them over a WebSocket.
 //
 // node moq.mjs PLAN.json, where the plan is
-//   { browser, url, port, relay, out }
-// `url` is a server's, `port` one at which nobody answers UDP, `relay` the address of a relay that has the session, or null. Pictures of the windows go to out/NAME.png. A JSON object of facts is printed.
+//   { browser, url, port, relay, out, server, again: [program, arguments] }
+// `url` is a server's, `port` one at which nobody answers UDP, `relay` the address of a relay that has the session, or null; `server` is the server's process, and `again` starts another at its address. Pictures of the windows go to out/NAME.png. A JSON object of facts is printed.
 
+import { spawn } from "node:child_process";
 import { readFile } from "node:fs/promises";
 import { join } from "node:path";
 
@@ -65,7 +66,23 @@ async function run() {
   facts.walled = await walled.evaluate(() => dapple.live.transport);
   await walled.context().close();
 
-  if (!plan.relay) return;
+  if (plan.relay) await byRelay();
+
+  // The server starts again, under another name and with another certificate.
+  process.kill(plan.server, "SIGKILL");
+  await until(looker, () => dapple.live.state !== "live");
+  const [program, parameters] = plan.again;
+  const server = spawn(program, parameters, { stdio: "ignore", cwd: plan.out });
+  try {
+    await isLive(looker);
+    await until(looker, () => dapple.edits.placed.length === 0);
+    facts.again = await looker.evaluate(() => dapple.live.transport);
+  } finally {
+    server.kill("SIGKILL");
+  }
+}
+
+async function byRelay() {
   const relayed = await open("relayed", `${plan.url}?${COARSE}`, (json) => {
     json.moq = { url: plan.relay, name: json.moq.name };
     return json;
@@ -76,6 +93,6 @@ async function run() {
 
 function open(name, url, change) {
   // That a connection cannot be made is said by the browser itself.
-  const options = { width: 960, height: 540, expected: /WebTransport|QUIC|ERR_CONNECTION/, change };
+  const options = { width: 960, height: 540, expected: /WebTransport|WebSocket|QUIC|ERR_CONNECTION/, change };
   return openPage(browser, facts.errors, name, url, options);
 }

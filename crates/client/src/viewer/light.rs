@@ -1,5 +1,6 @@
 //! The light that a viewer holds: store, atlas, and what of it lies on the card.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use dapple_gpu::Gpu;
@@ -22,7 +23,8 @@ pub(super) struct Light {
     is_new: bool,
     /// When the running fade began, seconds; long ago if none runs.
     fade_start_s: f64,
-    pace: Pace,
+    /// Of each part, or of light that comes as one: parts of one step come one after the other.
+    paces: BTreeMap<Option<u8>, Pace>,
     /// Why this atlas cannot be shown.
     problem: Option<String>,
 }
@@ -37,7 +39,7 @@ impl Light {
             inspection,
             is_new: false,
             fade_start_s: f64::NEG_INFINITY,
-            pace: Pace::default(),
+            paces: BTreeMap::new(),
             problem: None,
         }
     }
@@ -69,21 +71,21 @@ impl Light {
                     let cuts = self.received.cuts();
                     atlas.change_sets(&self.scene, store.layout().clone(), cuts, removed);
                 }
-                self.apply(changes, now_s, fade_s);
+                self.apply(part, changes, now_s, fade_s);
             }
-            Applied::Changes(changes) => self.apply(changes, now_s, fade_s),
+            Applied::Changes(changes) => self.apply(part, changes, now_s, fade_s),
             Applied::Ignored(_) => {}
         }
         Ok(applied)
     }
 
-    fn apply(&mut self, changes: &[ValueChange], now_s: f64, fade_s: Option<f32>) {
+    fn apply(&mut self, part: Option<u8>, changes: &[ValueChange], now_s: f64, fade_s: Option<f32>) {
         // What changes nothing is no update: the fade goes on.
         if changes.is_empty() {
             return;
         }
         let progress = self.fade(now_s, fade_s);
-        self.pace.note(now_s);
+        self.paces.entry(part).or_default().note(now_s);
         let Some(atlas) = &mut self.atlas else { return };
         atlas.begin_update(progress);
         atlas.apply(changes.iter().map(|c| PointChange { point: c.point, old: c.old, new: c.new }));
@@ -111,7 +113,8 @@ impl Light {
 
     /// Seconds that a fade takes: those that are wanted, or what the pace of updates asks for.
     pub(super) fn fade_s(&self, wanted_s: Option<f32>) -> f32 {
-        wanted_s.unwrap_or_else(|| self.pace.fade_s())
+        let paces = || self.paces.values().map(Pace::fade_s);
+        wanted_s.unwrap_or_else(|| paces().reduce(f32::max).unwrap_or_else(|| Pace::default().fade_s()))
     }
 
     /// How far the fade is at `now_s`, 0 … 1.

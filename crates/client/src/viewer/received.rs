@@ -10,12 +10,20 @@ pub(super) struct Received {
     limits: Limits,
     whole: Subscriber,
     parts: Option<Parts>,
+    /// Parts of another host may follow, with other points or other instances in each.
+    is_outdated: bool,
 }
 
 impl Received {
     /// Nothing yet; frames of another scene are refused.
     pub(super) fn new(scene_hash: [u8; 32], limits: Limits) -> Received {
-        Received { scene_hash, limits, whole: Subscriber::new(Some(scene_hash), limits), parts: None }
+        Received {
+            scene_hash,
+            limits,
+            whole: Subscriber::new(Some(scene_hash), limits),
+            parts: None,
+            is_outdated: false,
+        }
     }
 
     /// Takes a frame of a part, or of light that comes as one.
@@ -31,7 +39,13 @@ impl Received {
             // What came as one stays until there is something in its place.
             None => new.insert(Parts::new(Some(self.scene_hash), self.limits)),
         };
-        let applied = parts.receive(part.into(), frame)?;
+        let applied = match parts.receive(part.into(), frame) {
+            Err(ReceiveError::Misfit(_)) if std::mem::take(&mut self.is_outdated) => {
+                *parts = Parts::new(Some(self.scene_hash), self.limits);
+                parts.receive(part.into(), frame)?
+            }
+            applied => applied?,
+        };
         if new.is_some() {
             self.parts = new;
             self.whole.forget();
@@ -43,6 +57,7 @@ impl Received {
         self.whole.outdate();
         if let Some(parts) = &mut self.parts {
             parts.outdate();
+            self.is_outdated = true;
         }
     }
 

@@ -43,6 +43,8 @@ pub struct GuestConfig {
     pub bits_per_s: Option<u64>,
     /// Longest frame that it takes, bytes; 0 (default) for as long as `dapple_stream::Limits` allow.
     pub max_frame_bytes: usize,
+    /// Whether it takes the light in parts where it comes in some, and says which it needs. Default false.
+    pub in_parts: bool,
     /// Spreads the times at which many viewers try again.
     pub seed: u64,
 }
@@ -174,7 +176,7 @@ impl Guest {
                 }
                 self.backoff.reset();
                 let goes_on = self.light_goes_on(&welcome);
-                if !welcome.parts.is_empty() {
+                if self.config.in_parts && !welcome.parts.is_empty() {
                     self.sight = Some(Sight::new(&self.scene, &welcome.parts));
                 }
                 self.welcome = Some(welcome);
@@ -353,8 +355,11 @@ impl Guest {
         (self.look.held, self.look.state) = (self.held, self.version);
         self.look.waited_us = now_us.saturating_sub(self.heard_at_us);
         let time_s = self.scene_time_s(now_us);
-        if let (Some(sight), Some(camera)) = (&mut self.sight, &self.look.camera) {
-            self.look.parts = Some(sight.parts(camera, time_s, &self.edits, now_us));
+        if let Some(sight) = &mut self.sight {
+            let parts = sight.parts(self.look.camera.as_ref(), time_s, &self.edits, now_us);
+            // What was on its way of others does not come any more.
+            self.assemblies.retain(|part, _| part.is_none_or(|part| parts.contains(&part)));
+            self.look.parts = Some(parts);
         }
         (self.said, self.said_us) = (self.look.clone(), now_us);
         Some(FromViewer::Look(self.look.clone()).to_text())

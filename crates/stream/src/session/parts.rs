@@ -15,6 +15,8 @@ pub struct Parts {
     expected_scene_hash: Option<[u8; 32]>,
     limits: Limits,
     parts: BTreeMap<u32, Part>,
+    /// Whether anything has come.
+    has_come: bool,
     whole: PointStore,
     cuts: Cuts,
     bent_changes: Vec<BentChange>,
@@ -29,12 +31,13 @@ struct Part {
 }
 
 impl Parts {
-    /// Holds nothing. The scene's hash and the limits are those of each part, as in [`Subscriber::new`].
+    /// Holds nothing. The scene's hash is that of each part, as in [`Subscriber::new`]; the limits are those of all parts together.
     pub fn new(expected_scene_hash: Option<[u8; 32]>, limits: Limits) -> Parts {
         Parts {
             expected_scene_hash,
             limits,
             parts: BTreeMap::new(),
+            has_come: false,
             whole: PointStore::default(),
             cuts: Cuts::default(),
             bent_changes: Vec::new(),
@@ -51,7 +54,9 @@ impl Parts {
             subscriber: Subscriber::new(self.expected_scene_hash, self.limits),
             instances: Vec::new(),
         };
+        let left = self.left_for(part);
         let subscriber = &mut self.parts.entry(part).or_insert_with(new).subscriber;
+        subscriber.set_limits(left);
         match subscriber.receive(frame)? {
             Applied::Ignored(reason) => Ok(Applied::Ignored(reason)),
             Applied::Changes(changes) => Ok(Applied::Changes(self.change(part, &changes))),
@@ -90,7 +95,7 @@ impl Parts {
 
     /// Everything that has come, if anything has.
     pub fn store(&self) -> Option<&PointStore> {
-        Some(&self.whole).filter(|store| !store.layout().sets().is_empty())
+        self.has_come.then_some(&self.whole)
     }
 
     /// Which points do not count at which texels; empty where publishers send none.
@@ -108,12 +113,32 @@ impl Parts {
         self.parts.get(&part).map(|part| &part.subscriber)
     }
 
-    /// Bytes held beside the whole, by capacity or, of stores, by their points.
+    /// Bytes held beside the whole, by capacity or, of stores, by their points; the parts' cuts, which the whole has once more, are not counted.
     pub fn bytes(&self) -> usize {
         const A_PLACE: usize = size_of::<[u32; 3]>() + size_of::<PackedNormal>();
         let points = |store: &PointStore| store.value_bytes() + store.layout().len() * A_PLACE;
         let of = |part: &Part| part.subscriber.store().map_or(0, points) + part.subscriber.bytes();
         self.parts.values().map(of).sum()
+    }
+
+    /// What the other parts leave of the limits.
+    fn left_for(&self, number: u32) -> Limits {
+        let less = |limit: u32, used: u64| limit.saturating_sub(u32::try_from(used).unwrap_or(u32::MAX));
+        let others = || {
+            let others = self.parts.iter().filter(|(other, _)| **other != number);
+            others.map(|(_, part)| &part.subscriber)
+        };
+        let stores = || others().filter_map(Subscriber::store);
+        let cuts = others().filter_map(Subscriber::cuts).map(|cuts| cuts.site_count() as u64).sum();
+        Limits {
+            max_points: less(self.limits.max_points, stores().map(|store| store.layout().len() as u64).sum()),
+            max_sets: less(
+                self.limits.max_sets,
+                stores().map(|store| store.layout().sets().len() as u64).sum(),
+            ),
+            max_cuts: less(self.limits.max_cuts, cuts),
+            ..self.limits
+        }
     }
 
     /// Brings the whole to a part's new values.
@@ -165,7 +190,7 @@ impl Parts {
         let cuts = part.subscriber.cuts().map(|cuts| cuts.only(added)).unwrap_or_default();
         let all = instances(Some(of_part));
         self.cuts = self.cuts.with_sets(removed, &cuts);
-        self.whole = whole;
+        (self.whole, self.has_come) = (whole, true);
         self.parts.get_mut(&number).expect("it was there").instances = all;
         Ok(())
     }

@@ -150,6 +150,11 @@ impl Subscriber {
         }
     }
 
+    /// From the next frame on these limits hold.
+    pub(super) fn set_limits(&mut self, limits: Limits) {
+        self.limits = limits;
+    }
+
     /// Lets go of what is held: the next frame must be a snapshot.
     pub fn forget(&mut self) {
         self.state = None;
