@@ -36,7 +36,12 @@ impl Pace {
 
     /// Seconds that a fade takes, 0 … 0.5; 1/15 before two updates have come.
     pub fn fade_s(&self) -> f32 {
-        self.interval_s.map_or(START_S, |interval_s| interval_s as f32)
+        self.known_s().unwrap_or(START_S)
+    }
+
+    /// The same where two updates have come.
+    pub(crate) fn known_s(&self) -> Option<f32> {
+        self.interval_s.map(|interval_s| interval_s as f32)
     }
 }
 

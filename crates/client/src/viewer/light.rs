@@ -113,8 +113,9 @@ impl Light {
 
     /// Seconds that a fade takes: those that are wanted, or what the pace of updates asks for.
     pub(super) fn fade_s(&self, wanted_s: Option<f32>) -> f32 {
-        let paces = || self.paces.values().map(Pace::fade_s);
-        wanted_s.unwrap_or_else(|| paces().reduce(f32::max).unwrap_or_else(|| Pace::default().fade_s()))
+        // Where little changes, updates are rare.
+        let known = || self.paces.values().filter_map(Pace::known_s);
+        wanted_s.unwrap_or_else(|| known().reduce(f32::min).unwrap_or_else(|| Pace::default().fade_s()))
     }
 
     /// How far the fade is at `now_s`, 0 … 1.
