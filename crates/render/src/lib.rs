@@ -23,6 +23,7 @@ pub mod forward;
 pub mod gbuffer;
 pub mod image;
 pub mod psao;
+pub mod sao;
 pub mod shade;
 pub mod ssao;
 

@@ -98,11 +98,22 @@ impl Screen {
             return None;
         }
         let (column, row) = (sample_index % self.columns as usize, sample_index / self.columns as usize);
-        let x = (2.0 * column as f32 + 1.0) / self.columns as f32 - 1.0;
-        let y = 1.0 - (2.0 * row as f32 + 1.0) / self.rows as f32;
-        let scale = if self.lens.is_perspective { distance } else { 1.0 };
+        Some(self.place_view(column as f32 + 0.5, row as f32 + 0.5, distance))
+    }
+
+    /// The place at a distance that a point of the picture shows. Coordinates count samples: the first one's centre is at (0.5, 0.5).
+    pub fn place_view(&self, column: f32, row: f32, distance_m: f32) -> Vec3 {
+        let x = 2.0 * column / self.columns as f32 - 1.0;
+        let y = 1.0 - 2.0 * row / self.rows as f32;
+        let scale = if self.lens.is_perspective { distance_m } else { 1.0 };
         let [half_width, half_height] = self.lens.half_extent;
-        Some(Vec3::new(x * half_width * scale, y * half_height * scale, -distance))
+        Vec3::new(x * half_width * scale, y * half_height * scale, -distance_m)
+    }
+
+    /// How many samples of the picture a metre across the view axis is long at a distance. Samples are taken to be square.
+    pub fn samples_per_metre(&self, distance_m: f32) -> f32 {
+        let at_one = 0.5 * self.rows as f32 / self.lens.half_extent[1];
+        if self.lens.is_perspective { at_one / distance_m } else { at_one }
     }
 
     /// Index of the sample whose square of the picture a place falls on; `None` outside of the picture and behind the camera.

@@ -1,0 +1,140 @@
+//! The sampling pass: places on a spiral around each sample, and the mean of what they block (sec. 2.3).
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::{Pyramid, SaoParams};
+use crate::gbuffer::Screen;
+
+/// Keeps the quotient of eq. 1 finite, square metres.
+const EPSILON_M2: f32 = 1e-4;
+
+/// Samples that are farther apart than this along the view axis are not averaged in a quad, metres.
+const QUAD_EDGE_M: f32 = 0.02;
+
+/// Visibility by eq. 1 of each sample, row-major from the top, noisy: 0 … 1, and 1 for the background. The parameters must have passed
+/// [`SaoParams::check`], the pyramid be that of the picture.
+pub fn sample_obscurance(screen: &Screen, pyramid: &Pyramid, params: &SaoParams) -> Vec<f32> {
+    let columns = screen.columns() as usize;
+    let spiral = Spiral::new(params);
+    let mut visibility = vec![1.0; screen.distances_m().len()];
+    visibility.par_chunks_mut(columns).enumerate().for_each(|(row, values)| {
+        for (column, value) in values.iter_mut().enumerate() {
+            if let Some(place) = screen.position_view(row * columns + column) {
+                let normal = normal_view(screen, [column, row]);
+                *value = visibility_at(screen, pyramid, params, &spiral, [column, row], place, normal);
+            }
+        }
+    });
+    visibility
+}
+
+/// Lengths and angles of the places, the same around each sample.
+struct Spiral {
+    /// Part of the radius, and angle in radians.
+    steps: Vec<(f32, f32)>,
+}
+
+impl Spiral {
+    /// Eq. 6.
+    fn new(params: &SaoParams) -> Spiral {
+        let step = |i: u32| {
+            let part = (i as f32 + 0.5) / params.samples as f32;
+            (part, std::f32::consts::TAU * part * params.turns as f32)
+        };
+        Spiral { steps: (0..params.samples).map(step).collect() }
+    }
+}
+
+/// Eq. 8, AlchemyAO's hash: how far the spiral of a sample is turned, radians.
+pub(crate) fn turn([column, row]: [usize; 2]) -> f32 {
+    let (x, y) = (column as u32, row as u32);
+    let hash = (x.wrapping_mul(3) ^ y.wrapping_add(x.wrapping_mul(y))).wrapping_mul(10);
+    // Of large angles single precision keeps little.
+    (f64::from(hash) % std::f64::consts::TAU) as f32
+}
+
+fn visibility_at(
+    screen: &Screen,
+    pyramid: &Pyramid,
+    params: &SaoParams,
+    spiral: &Spiral,
+    at: [usize; 2],
+    place: Vec3,
+    normal: Vec3,
+) -> f32 {
+    let distance = -place.z;
+    let radius = params.radius_m * screen.samples_per_metre(distance);
+    let turn = turn(at);
+    let top = pyramid.levels() - 1;
+    let mut sum = 0.0;
+    for (part, angle) in &spiral.steps {
+        let length = radius * part;
+        let (sin, cos) = libm::sincosf(angle + turn);
+        let Some(seen) = offset(screen, at, [length * cos, length * sin]) else { continue };
+        // Eq. 9: the higher the farther it is on the screen.
+        let level = (length as u32).checked_ilog2().unwrap_or(0).saturating_sub(params.switch_log2);
+        let (seen_m, [column, row]) = pyramid.read((level as usize).min(top), seen);
+        if !seen_m.is_finite() {
+            continue;
+        }
+        let to_seen = screen.place_view(column as f32 + 0.5, row as f32 + 0.5, seen_m) - place;
+        let height = to_seen.dot(normal) - params.bias_m - distance * params.beta;
+        sum += height.max(0.0) / (to_seen.length_squared() + EPSILON_M2);
+    }
+    let darkness = 2.0 * params.sigma_m() / params.samples as f32 * sum;
+    let open = (1.0 - darkness).max(0.0);
+    if params.exponent == 1.0 { open } else { libm::powf(open, params.exponent) }
+}
+
+/// The sample so far to the right and down of another, if it is in the picture.
+pub(crate) fn offset(screen: &Screen, [column, row]: [usize; 2], by: [f32; 2]) -> Option<[usize; 2]> {
+    let column = column as i64 + by[0] as i64;
+    let row = row as i64 + by[1] as i64;
+    let inside =
+        column >= 0 && row >= 0 && column < i64::from(screen.columns()) && row < i64::from(screen.rows());
+    inside.then_some([column as usize, row as usize])
+}
+
+/// Eq. 4: the face's normal, from the places that a sample's quad of 2 × 2 shows. Towards the eye; along the view axis where the quad has no
+/// other sample.
+pub(crate) fn normal_view(screen: &Screen, [column, row]: [usize; 2]) -> Vec3 {
+    let columns = screen.columns() as usize;
+    let place = |column: usize, row: usize| {
+        let inside = column < columns && row < screen.rows() as usize;
+        inside.then(|| screen.position_view(row * columns + column)).flatten()
+    };
+    let difference = |from: [usize; 2], to: [usize; 2]| Some(place(to[0], to[1])? - place(from[0], from[1])?);
+    let (left, top) = (column & !1, row & !1);
+    let along_row = difference([left, row], [left + 1, row]).unwrap_or(Vec3::X);
+    let down = difference([column, top], [column, top + 1]).unwrap_or(Vec3::NEG_Y);
+    // Down the picture is −y.
+    down.cross(along_row).try_normalize().unwrap_or(Vec3::Z)
+}
+
+/// Averages the values of quads of 2 × 2 samples where there is no edge (end of sec. 2.3): first along rows, then along columns.
+pub fn filter_quads(screen: &Screen, visibility: &mut [f32]) {
+    let columns = screen.columns() as usize;
+    let distances_m = screen.distances_m();
+    visibility.par_chunks_mut(2 * columns).zip(distances_m.par_chunks(2 * columns)).for_each(
+        |(values, distances)| {
+            let rows = values.len() / columns;
+            let average = |values: &mut [f32], a: usize, b: usize| {
+                if (distances[a] - distances[b]).abs() < QUAD_EDGE_M {
+                    let mean = 0.5 * (values[a] + values[b]);
+                    (values[a], values[b]) = (mean, mean);
+                }
+            };
+            for row in 0..rows {
+                for column in (0..columns - columns % 2).step_by(2) {
+                    average(values, row * columns + column, row * columns + column + 1);
+                }
+            }
+            if rows == 2 {
+                for column in 0..columns {
+                    average(values, column, columns + column);
+                }
+            }
+        },
+    );
+}
