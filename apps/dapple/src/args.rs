@@ -16,6 +16,8 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
 
+use crate::screen_space::ScreenSpace;
+
 pub(crate) use bake::BakeArgs;
 pub(crate) use bench::{Bench, BenchArgs, JoinArgs, ServedArgs, SoakArgs, ViewersArgs};
 pub(crate) use bit_rate::BitRate;
@@ -245,10 +247,35 @@ pub(crate) enum RenderMethod {
     PsaoHat,
     /// Rays at every pixel: the truth.
     Rtao,
-    /// From the picture's depth and normals alone.
+    /// From the picture's depth and normals alone: random places.
     Ssao,
+    /// The same: AlchemyAO.
+    Alchemy,
+    /// From depth alone: scalable ambient obscurance.
+    Sao,
+    /// From depth and normals: horizons.
+    Hbao,
+    /// The same: HBAO+.
+    HbaoPlus,
+    /// The same: slices with a visibility bitmask.
+    Gtao,
     /// No occlusion.
     None,
+}
+
+impl RenderMethod {
+    /// Which screen-space method it is, if it is one.
+    pub(crate) fn screen_space(self) -> Option<ScreenSpace> {
+        match self {
+            RenderMethod::Ssao => Some(ScreenSpace::Ssao),
+            RenderMethod::Alchemy => Some(ScreenSpace::Alchemy),
+            RenderMethod::Sao => Some(ScreenSpace::Sao),
+            RenderMethod::Hbao => Some(ScreenSpace::Hbao),
+            RenderMethod::HbaoPlus => Some(ScreenSpace::HbaoPlus),
+            RenderMethod::Gtao => Some(ScreenSpace::Gtao),
+            RenderMethod::Psao | RenderMethod::PsaoHat | RenderMethod::Rtao | RenderMethod::None => None,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -288,7 +315,7 @@ pub(crate) enum Method {
         rays: u32,
     },
     /// From the picture's depth and normals alone.
-    Ssao,
+    Screen(ScreenSpace),
     None,
 }
 
@@ -315,7 +342,7 @@ impl std::fmt::Display for Method {
             Method::PsaoPaperMls => write!(f, "psao-paper-mls"),
             Method::Sas { bias } => write!(f, "sas-{bias}"),
             Method::Rtao { rays } => write!(f, "rtao-{rays}"),
-            Method::Ssao => write!(f, "ssao"),
+            Method::Screen(method) => write!(f, "{}", method.name()),
             Method::None => write!(f, "none"),
         }
     }
@@ -331,10 +358,12 @@ impl FromStr for Method {
             "psao-hat" => Ok(Method::PsaoHat { radius: 1.0 }),
             "psao-paper" => Ok(Method::PsaoPaper),
             "psao-paper-mls" => Ok(Method::PsaoPaperMls),
-            "ssao" => Ok(Method::Ssao),
             "none" => Ok(Method::None),
             "rtao" => Ok(Method::Rtao { rays: 16 }),
             _ => {
+                if let Some(method) = ScreenSpace::ALL.into_iter().find(|method| method.name() == s) {
+                    return Ok(Method::Screen(method));
+                }
                 let rays = s.strip_prefix("rtao-").and_then(|r| r.parse().ok());
                 let radius = s.strip_prefix("psao-hat-").and_then(|r| r.parse::<f32>().ok());
                 let bias = s.strip_prefix("sas-").and_then(|b| b.parse().ok());
@@ -344,7 +373,8 @@ impl FromStr for Method {
                     (.., Some(bias @ 1..=1024)) => Ok(Method::Sas { bias }),
                     _ => Err(
                         "known methods: psao, psao-mls, psao-hat, psao-hat-F with its radius times F from 0.1 to 8, \
-                              psao-paper, psao-paper-mls, sas-B with B from 1 to 1024, rtao-R with R from 1 to 65536 (rtao-16), ssao, none"
+                              psao-paper, psao-paper-mls, sas-B with B from 1 to 1024, rtao-R with R from 1 to 65536 (rtao-16), ssao, alchemy, sao, hbao, hbao-plus, \
+                              gtao, none"
                             .into(),
                     ),
                 }
@@ -476,7 +506,10 @@ mod tests {
             assert!(text.parse::<Size>().is_err(), "{text}");
         }
         assert_eq!("rtao-512".parse(), Ok(Method::Rtao { rays: 512 }));
-        for method in [Method::PsaoPaper, Method::PsaoPaperMls, Method::PsaoHat { radius: 1.5 }, Method::Ssao]
+        let screen = ScreenSpace::ALL.map(Method::Screen);
+        for method in [Method::PsaoPaper, Method::PsaoPaperMls, Method::PsaoHat { radius: 1.5 }]
+            .into_iter()
+            .chain(screen)
         {
             assert_eq!(method.to_string().parse(), Ok(method));
         }

@@ -21,6 +21,7 @@ mod progress;
 mod record;
 mod render;
 mod scene_command;
+mod screen_space;
 mod serve;
 mod source;
 mod transport;

@@ -9,7 +9,6 @@ use dapple_render::compose::{view_normals, view_visibility};
 use dapple_render::image::{LinearImage, Rgb8Image, ToneMap};
 use dapple_render::psao::{Hat, Kernel};
 use dapple_render::shade::{Gathering, Openings, ShadeParams, shade_gathered};
-use dapple_render::ssao::{SsaoParams, estimate_visibility};
 use dapple_scene::PosedCamera;
 use dapple_scene::glam::Vec3;
 use dapple_server::{Progress, Server, ServerConfig};
@@ -24,6 +23,7 @@ use crate::exr_file::{write_gray, write_rgb};
 use crate::light::{adaptive, publish};
 use crate::picture::{open_directions, sites, write_png};
 use crate::progress::Bar;
+use crate::screen_space::ScreenSpace;
 use crate::source::{self, Loaded};
 
 /// Renders what the arguments ask for and writes it.
@@ -194,9 +194,11 @@ fn visibility(
     let reconstruction = match method {
         RenderMethod::None => return Ok(None),
         RenderMethod::Rtao => return Ok(Some(traced(args, loaded, drawn)?)),
-        RenderMethod::Ssao => return Ok(Some(screen_space(args, loaded, drawn, camera)?)),
-        RenderMethod::Psao => Reconstruction::Atlas,
         RenderMethod::PsaoHat => Kernel::Hat(Hat::default()).into(),
+        method => match method.screen_space() {
+            Some(method) => return Ok(Some(screen_space(args, method, loaded, drawn, camera)?)),
+            None => Reconstruction::Atlas,
+        },
     };
     let (_, client) = light(args, loaded)?;
     Ok(Some(client.visibility(drawn, &reconstruction)))
@@ -223,11 +225,16 @@ fn traced(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn) -> Result<Vec<f32>>
     Ok(visibility)
 }
 
-fn screen_space(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn, camera: &PosedCamera) -> Result<Vec<f32>> {
+fn screen_space(
+    args: &RenderArgs,
+    method: ScreenSpace,
+    loaded: &Loaded,
+    drawn: &Drawn,
+    camera: &PosedCamera,
+) -> Result<Vec<f32>> {
     let (radius_m, _) = source::resolve_radius(&loaded.scene, &args.visibility)?;
     let screen = drawn.gbuffer.screen(&loaded.scene, &drawn.pose, camera)?;
-    let params = SsaoParams { radius_m, seed: args.visibility.seed, ..SsaoParams::default() };
-    Ok(estimate_visibility(&screen, &params)?)
+    method.visibility(&screen, radius_m, args.visibility.seed)
 }
 
 /// A server brought to the picture's time, and a client that has joined it.

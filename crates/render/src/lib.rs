@@ -11,16 +11,22 @@
 //! Results do not depend on the number of threads nor on the machine: loops run in the caller's rayon pool, and all
 //! transcendental functions come from `libm`.
 
+#[allow(dead_code)]
+mod bilateral;
 mod error;
+mod noise;
 mod projection;
 #[cfg(test)]
 mod testing;
 mod texture;
 
+pub mod alchemy;
 pub mod compose;
 #[cfg(feature = "gpu")]
 pub mod forward;
 pub mod gbuffer;
+pub mod gtao;
+pub mod hbao;
 pub mod image;
 pub mod psao;
 pub mod sao;

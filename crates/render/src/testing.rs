@@ -1,5 +1,7 @@
 //! Scenes made by hand, and golden images, for this crate's tests.
 
+pub(crate) mod screen;
+
 use std::path::PathBuf;
 
 use dapple_scene::{

@@ -6,7 +6,6 @@ use anyhow::Result;
 use dapple_client::Drawn;
 use dapple_metrics::Flicker;
 use dapple_render::compose::resolve_plane;
-use dapple_render::ssao::{SsaoParams, estimate_visibility};
 use dapple_trace::rtao::{RtaoParams, trace_visibility};
 use serde::{Deserialize, Serialize};
 
@@ -265,15 +264,10 @@ impl Line {
                 }
                 Some(visibility)
             }
-            (Method::Ssao, _) => {
+            (Method::Screen(method), _) => {
                 let scene = stage.scene();
                 let screen = drawn.gbuffer.screen(scene, &drawn.pose, &stage.camera_at(drawn))?;
-                let params = SsaoParams {
-                    radius_m: stage.radius_m,
-                    seed: stage.settings.seed,
-                    ..SsaoParams::default()
-                };
-                Some(estimate_visibility(&screen, &params)?)
+                Some(method.visibility(&screen, stage.radius_m, stage.settings.seed)?)
             }
             _ => None,
         };

@@ -110,6 +110,37 @@ impl Screen {
         Vec3::new(x * half_width * scale, y * half_height * scale, -distance_m)
     }
 
+    /// Where what a point of the picture shows meets the plane through a place with a normal; `None` if it does not, or behind the camera. Coordinates as of
+    /// [`Screen::place_view`].
+    pub fn on_plane(&self, column: f32, row: f32, place_view: Vec3, normal_view: Vec3) -> Option<Vec3> {
+        let (origin, ray) = if self.lens.is_perspective {
+            (Vec3::ZERO, self.place_view(column, row, 1.0))
+        } else {
+            (self.place_view(column, row, 0.0), Vec3::NEG_Z)
+        };
+        let along = normal_view.dot(place_view - origin) / normal_view.dot(ray);
+        let is_before = along.is_finite() && (along > 0.0 || !self.lens.is_perspective);
+        is_before.then(|| origin + ray * along)
+    }
+
+    /// The sample so many to the right and down of another, rounded towards it; `None` outside of the picture.
+    pub fn neighbour(&self, [column, row]: [usize; 2], by: [f32; 2]) -> Option<[usize; 2]> {
+        let (column, row) = (column as i64 + by[0] as i64, row as i64 + by[1] as i64);
+        let inside =
+            (0..i64::from(self.columns)).contains(&column) && (0..i64::from(self.rows)).contains(&row);
+        inside.then_some([column as usize, row as usize])
+    }
+
+    /// The place that the sample in a column and row sees; `None` for the background.
+    pub fn position_at(&self, [column, row]: [usize; 2]) -> Option<Vec3> {
+        self.position_view(row * self.columns as usize + column)
+    }
+
+    /// The way from a place to the eye, a unit vector.
+    pub fn towards_eye(&self, place_view: Vec3) -> Vec3 {
+        if self.lens.is_perspective { (-place_view).normalize_or(Vec3::Z) } else { Vec3::Z }
+    }
+
     /// How many samples of the picture a metre across the view axis is long at a distance. Samples are taken to be square.
     pub fn samples_per_metre(&self, distance_m: f32) -> f32 {
         let at_one = 0.5 * self.rows as f32 / self.lens.half_extent[1];

@@ -17,7 +17,7 @@ pub struct SaoParams {
     pub sigma_m: Option<f32>,
     /// How far what blocks must stand above the surface, as a part of the distance to the eye, ≥ 0; default 0.0001 \[β\].
     pub beta: f32,
-    /// The same as a length, metres, ≥ 0; default 0.001.
+    /// The same as a length, metres, ≥ 0; default 0.005.
     pub bias_m: f32,
     /// Contrast: visibility to this power, > 0; default 1 \[k\].
     pub exponent: f32,
@@ -43,7 +43,7 @@ pub struct SaoParams {
 
 impl SaoParams {
     /// Default \[σ\] as a part of the radius: chosen on the atrium, see `README.md`.
-    pub const SIGMA_OF_RADIUS: f32 = 0.25;
+    pub const SIGMA_OF_RADIUS: f32 = 0.45;
 
     /// What darkens is multiplied by this, metres.
     pub fn sigma_m(&self) -> f32 {
@@ -86,7 +86,7 @@ impl Default for SaoParams {
             radius_m: 0.6,
             sigma_m: None,
             beta: 1e-4,
-            bias_m: 1e-3,
+            bias_m: 5e-3,
             exponent: 1.0,
             samples: 9,
             turns: 7,

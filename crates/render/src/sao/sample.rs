@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::{Pyramid, SaoParams};
 use crate::gbuffer::Screen;
+use crate::noise::alchemy_turn;
 
 /// Keeps the quotient of eq. 1 finite, square metres.
 const EPSILON_M2: f32 = 1e-4;
@@ -46,14 +47,6 @@ impl Spiral {
     }
 }
 
-/// Eq. 8, AlchemyAO's hash: how far the spiral of a sample is turned, radians.
-pub(crate) fn turn([column, row]: [usize; 2]) -> f32 {
-    let (x, y) = (column as u32, row as u32);
-    let hash = (x.wrapping_mul(3) ^ y.wrapping_add(x.wrapping_mul(y))).wrapping_mul(10);
-    // Of large angles single precision keeps little.
-    (f64::from(hash) % std::f64::consts::TAU) as f32
-}
-
 fn visibility_at(
     screen: &Screen,
     pyramid: &Pyramid,
@@ -65,13 +58,13 @@ fn visibility_at(
 ) -> f32 {
     let distance = -place.z;
     let radius = params.radius_m * screen.samples_per_metre(distance);
-    let turn = turn(at);
+    let turn = alchemy_turn(at);
     let top = pyramid.levels() - 1;
     let mut sum = 0.0;
     for (part, angle) in &spiral.steps {
         let length = radius * part;
         let (sin, cos) = libm::sincosf(angle + turn);
-        let Some(seen) = offset(screen, at, [length * cos, length * sin]) else { continue };
+        let Some(seen) = screen.neighbour(at, [length * cos, length * sin]) else { continue };
         // Eq. 9: the higher the farther it is on the screen.
         let level = (length as u32).checked_ilog2().unwrap_or(0).saturating_sub(params.switch_log2);
         let (seen_m, [column, row]) = pyramid.read((level as usize).min(top), seen);
@@ -85,15 +78,6 @@ fn visibility_at(
     let darkness = 2.0 * params.sigma_m() / params.samples as f32 * sum;
     let open = (1.0 - darkness).max(0.0);
     if params.exponent == 1.0 { open } else { libm::powf(open, params.exponent) }
-}
-
-/// The sample so far to the right and down of another, if it is in the picture.
-pub(crate) fn offset(screen: &Screen, [column, row]: [usize; 2], by: [f32; 2]) -> Option<[usize; 2]> {
-    let column = column as i64 + by[0] as i64;
-    let row = row as i64 + by[1] as i64;
-    let inside =
-        column >= 0 && row >= 0 && column < i64::from(screen.columns()) && row < i64::from(screen.rows());
-    inside.then_some([column as usize, row as usize])
 }
 
 /// Eq. 4: the face's normal, from the places that a sample's quad of 2 × 2 shows. Towards the eye; along the view axis where the quad has no

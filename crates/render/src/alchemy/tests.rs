@@ -1,0 +1,57 @@
+//! What AlchemyAO keeps to: the general rules of screen-space methods, and a corner.
+
+use glam::Vec3;
+
+use super::*;
+use crate::compose::view_visibility;
+use crate::gbuffer::rasterize;
+use crate::testing::check_golden;
+use crate::testing::screen::{check_lenses, check_pictures, check_walls, corner_profile, look, still_life};
+
+fn estimate(params: AlchemyParams) -> impl Fn(&Screen) -> Vec<f32> + Sync {
+    move |screen| estimate_visibility(screen, &params).unwrap()
+}
+
+#[test]
+fn walls_are_open_pictures_are_pictures_and_lenses_agree() {
+    check_walls(&estimate(AlchemyParams::default()), 75.0, 0.99);
+    check_pictures(&estimate(AlchemyParams { radius_m: 1.5, ..AlchemyParams::default() }));
+    // A bias by distance is no part of what both lenses see.
+    check_lenses(&estimate(AlchemyParams { beta: 0.0, ..AlchemyParams::default() }), 0.01);
+}
+
+#[test]
+fn a_corner_darkens_as_its_estimator_does() {
+    let means = corner_profile(&estimate(AlchemyParams::default()), 0.6);
+    for pair in means.windows(2).take(10) {
+        assert!(pair[0][0] <= pair[1][0] + 0.02, "{means:?}");
+    }
+    for (i, [found, truth]) in means.iter().enumerate() {
+        assert!((found - truth).abs() < 0.25, "strip {i}: {found}, the truth is {truth}");
+    }
+}
+
+#[test]
+fn parameters_out_of_range_are_named() {
+    let good = AlchemyParams::default();
+    for (params, says) in [
+        (AlchemyParams { radius_m: 0.0, ..good }, "radius_m is 0,"),
+        (AlchemyParams { sigma_of_radius: -1.0, ..good }, "sigma_of_radius is -1"),
+        (AlchemyParams { samples: 0, ..good }, "1 to 256"),
+        (AlchemyParams { exponent: 0.0, ..good }, "exponent is 0"),
+        (AlchemyParams { blur_taps: 17, ..good }, "0 to 16"),
+    ] {
+        let error = params.check().unwrap_err().to_string();
+        assert!(error.contains("alchemy") && error.contains(says), "{error}");
+    }
+}
+
+#[test]
+fn golden_view() {
+    let stage = still_life();
+    let camera = look(Vec3::new(3.2, 2.4, 1.8), Vec3::new(0.5, 0.5, 0.0));
+    let gbuffer = rasterize(&stage.scene, &stage.pose, &camera, 80, 60, 2).unwrap();
+    let screen = gbuffer.screen(&stage.scene, &stage.pose, &camera).unwrap();
+    let visibility = estimate_visibility(&screen, &AlchemyParams::default()).unwrap();
+    check_golden("alchemy", "still-life", &view_visibility(&gbuffer, &visibility).unwrap());
+}

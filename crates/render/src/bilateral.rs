@@ -1,0 +1,81 @@
+//! A blur that keeps to surfaces: along rows, then along columns, weighted by a bell and by how near two samples lie to the plane of each other.
+
+use rayon::prelude::*;
+
+use crate::gbuffer::Screen;
+
+/// How wide, and how strictly within surfaces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Bilateral {
+    /// Taps on either side of a sample, 0 (no blur) … 16.
+    pub(crate) taps: u32,
+    /// Samples of the picture between two taps, 1 … 16.
+    pub(crate) stride: u32,
+    /// What distances may differ by, as a part of the distance, before a neighbour counts nothing, > 0. Slopes are foretold: see [`Bilateral::smooth`].
+    pub(crate) tolerance: f32,
+}
+
+impl Bilateral {
+    /// Smooths one value a sample. Whether a neighbour belongs to the same surface is asked of the difference between its distance and the one that the sample's
+    /// own slope foretells, so that floors which are seen at a grazing angle are smoothed, too. The background stays as it is.
+    pub(crate) fn smooth(&self, screen: &Screen, values: &[f32]) -> Vec<f32> {
+        let (columns, rows) = (screen.columns() as usize, screen.rows() as usize);
+        if self.taps == 0 {
+            return values.to_vec();
+        }
+        let bell: Vec<f32> = (0..=self.taps)
+            .map(|tap| {
+                let x = f64::from(tap) / (0.5 * f64::from(self.taps) + 0.5);
+                libm::exp(-0.5 * x * x) as f32
+            })
+            .collect();
+        let distances_m = screen.distances_m();
+        let mut across = vec![0.0; values.len()];
+        across.par_chunks_mut(columns).enumerate().for_each(|(row, out)| {
+            for (column, out) in out.iter_mut().enumerate() {
+                let index = |at: usize| row * columns + at;
+                *out = self.at(&bell, column, columns, |at| (values[index(at)], distances_m[index(at)]));
+            }
+        });
+        let mut both = vec![0.0; values.len()];
+        both.par_chunks_mut(columns).enumerate().for_each(|(row, out)| {
+            for (column, out) in out.iter_mut().enumerate() {
+                let index = |at: usize| at * columns + column;
+                *out = self.at(&bell, row, rows, |at| (across[index(at)], distances_m[index(at)]));
+            }
+        });
+        both
+    }
+
+    /// The mean about `at` of `count` samples, each a value and a distance.
+    fn at(&self, bell: &[f32], at: usize, count: usize, sample: impl Fn(usize) -> (f32, f32)) -> f32 {
+        let (value, distance) = sample(at);
+        if !distance.is_finite() {
+            return value;
+        }
+        // The gentler of the slopes to both sides: the other may lead over an edge.
+        let slopes = [at.checked_sub(1), Some(at + 1).filter(|next| *next < count)].map(|next| {
+            let next = next?;
+            Some((sample(next).1 - distance) * (next as f32 - at as f32)).filter(|slope| slope.is_finite())
+        });
+        let slope =
+            slopes.into_iter().flatten().reduce(|a, b| if a.abs() < b.abs() { a } else { b }).unwrap_or(0.0);
+        let (mut sum, mut weights) = (bell[0] * value, bell[0]);
+        for (tap, bell) in bell.iter().enumerate().skip(1) {
+            let step = tap * self.stride as usize;
+            let before = at.checked_sub(step).map(|other| (other, -(step as f32)));
+            let after = Some((at + step, step as f32)).filter(|(other, _)| *other < count);
+            for (other, by) in [before, after].into_iter().flatten() {
+                let (value, found) = sample(other);
+                let off = (found - distance - slope * by).abs().min((found - distance).abs());
+                let weight = bell * (1.0 - off / (self.tolerance * distance)).max(0.0);
+                // An infinite distance has no weight.
+                if weight > 0.0 {
+                    sum += weight * value;
+                    weights += weight;
+                }
+            }
+        }
+        sum / weights
+    }
+}

@@ -1,0 +1,62 @@
+//! What HBAO, and HBAO+, keeps to: the general rules of screen-space methods, and a corner.
+
+use glam::Vec3;
+
+use super::*;
+use crate::compose::view_visibility;
+use crate::gbuffer::rasterize;
+use crate::testing::check_golden;
+use crate::testing::screen::{check_lenses, check_pictures, check_walls, corner_profile, look, still_life};
+
+fn estimate(params: HbaoParams) -> impl Fn(&Screen) -> Vec<f32> + Sync {
+    move |screen| estimate_visibility(screen, &params).unwrap()
+}
+
+#[test]
+fn walls_are_open_pictures_are_pictures_and_lenses_agree() {
+    for params in [HbaoParams::hbao(), HbaoParams::hbao_plus()] {
+        check_walls(&estimate(params), 75.0, 0.99);
+        check_pictures(&estimate(HbaoParams { radius_m: 1.5, ..params }));
+        check_lenses(&estimate(params), 0.01);
+    }
+}
+
+#[test]
+fn a_corner_darkens_towards_its_edge() {
+    for params in [HbaoParams::hbao(), HbaoParams::hbao_plus()] {
+        let means = corner_profile(&estimate(params), 0.6);
+        for pair in means.windows(2).take(10) {
+            assert!(pair[0][0] <= pair[1][0] + 0.02, "{params:?}: {means:?}");
+        }
+        for (i, [found, truth]) in means.iter().enumerate() {
+            assert!((found - truth).abs() < 0.3, "{params:?}, strip {i}: {found}, the truth is {truth}");
+        }
+    }
+}
+
+#[test]
+fn parameters_out_of_range_are_named() {
+    let good = HbaoParams::hbao();
+    for (params, says) in [
+        (HbaoParams { radius_m: f32::NAN, ..good }, "radius_m is NaN"),
+        (HbaoParams { directions: 0, ..good }, "directions is 0"),
+        (HbaoParams { steps: 65, ..good }, "1 to 64"),
+        (HbaoParams { bias_degrees: 90.0, ..good }, "0 to 89"),
+        (HbaoParams { strength: -1.0, ..good }, "strength is -1"),
+    ] {
+        let error = params.check().unwrap_err().to_string();
+        assert!(error.contains("hbao") && error.contains(says), "{error}");
+    }
+}
+
+#[test]
+fn golden_views() {
+    let stage = still_life();
+    let camera = look(Vec3::new(3.2, 2.4, 1.8), Vec3::new(0.5, 0.5, 0.0));
+    let gbuffer = rasterize(&stage.scene, &stage.pose, &camera, 80, 60, 2).unwrap();
+    let screen = gbuffer.screen(&stage.scene, &stage.pose, &camera).unwrap();
+    for (name, params) in [("hbao", HbaoParams::hbao()), ("hbao-plus", HbaoParams::hbao_plus())] {
+        let visibility = estimate_visibility(&screen, &params).unwrap();
+        check_golden("hbao", name, &view_visibility(&gbuffer, &visibility).unwrap());
+    }
+}

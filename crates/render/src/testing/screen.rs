@@ -1,0 +1,131 @@
+//! What every screen-space method must keep to, on scenes whose visibility is known.
+
+use dapple_scene::{PosedCamera, Projection};
+use glam::{Affine3A, Vec3};
+
+use super::{Stage, cube, ground, quad, sphere, turned, with_threads};
+use crate::gbuffer::{GBuffer, Screen, rasterize};
+
+/// A method with its parameters.
+pub(crate) type Estimate<'a> = &'a (dyn Fn(&Screen) -> Vec<f32> + Sync);
+
+pub(crate) fn look(eye: Vec3, target: Vec3) -> PosedCamera {
+    PosedCamera::look_at(eye, target, 0.8)
+}
+
+pub(crate) fn draw(stage: &Stage, camera: &PosedCamera, [width, height]: [u32; 2]) -> (GBuffer, Screen) {
+    let gbuffer = rasterize(&stage.scene, &stage.pose, camera, width, height, 1).unwrap();
+    let screen = gbuffer.screen(&stage.scene, &stage.pose, camera).unwrap();
+    (gbuffer, screen)
+}
+
+/// An endless ground, and an endless wall of height 3 on it at x = 0 that faces +x.
+pub(crate) fn corner() -> Stage {
+    let mut stage = Stage::new();
+    stage.add(ground(40.0), 0, Affine3A::IDENTITY);
+    let at = |y: f32, z: f32| Vec3::new(0.0, y, z);
+    stage.add(quad([at(0.0, 40.0), at(0.0, -40.0), at(3.0, -40.0), at(3.0, 40.0)]), 0, Affine3A::IDENTITY);
+    stage
+}
+
+/// A sphere and a box in a corner.
+pub(crate) fn still_life() -> Stage {
+    let mut stage = corner();
+    let ball = Affine3A::from_translation(Vec3::new(0.9, 0.5, 0.6)) * Affine3A::from_scale(Vec3::splat(0.5));
+    stage.add(sphere(24, 32), 0, ball);
+    stage.add(cube(), 0, turned(0.7, Vec3::new(1.0, 0.4, -0.7)) * Affine3A::from_scale(Vec3::splat(0.4)));
+    stage
+}
+
+/// Visibility of the ground at distance `d` from an endless wall of height `h`, rays of length `r`: `ARCHITECTURE.md`.
+pub(crate) fn beside_a_wall(d: f64, h: f64, r: f64) -> f64 {
+    let s = |c: f64| if c >= 1.0 { 0.0 } else { libm::acos(c) - c * (1.0 - c * c).sqrt() };
+    let (c, a) = (d / r, d / (d * d + h * h).sqrt());
+    1.0 - (s(c) - a * s(c / a)) / std::f64::consts::PI
+}
+
+/// A plane seen at up to so many degrees, through both lenses, is this open at least.
+pub(crate) fn check_walls(estimate: Estimate<'_>, steepest: f64, least: f32) {
+    let mut stage = Stage::new();
+    stage.add(ground(60.0), 0, Affine3A::IDENTITY);
+    for degrees in [0.0, 10.0, 45.0, 60.0, 75.0, 82.0f64].into_iter().filter(|d| *d <= steepest) {
+        let angle = degrees.to_radians();
+        let eye = Vec3::new(libm::sin(angle) as f32, libm::cos(angle) as f32, 0.1) * 6.0;
+        for projection in [
+            Projection::Perspective { yfov: 0.8, near: 0.02 },
+            Projection::Orthographic { half_height: 1.5, near: 0.1, far: 90.0 },
+        ] {
+            let camera = PosedCamera { projection, ..look(eye, Vec3::ZERO) };
+            let (gbuffer, screen) = draw(&stage, &camera, [97, 61]);
+            let visibility = estimate(&screen);
+            let covered = gbuffer.samples().iter().filter(|s| s.is_covered()).count();
+            assert!(covered > 3000, "{degrees}: {covered}");
+            let found = visibility.iter().copied().fold(1.0, f32::min);
+            assert!(found >= least, "{degrees}, {projection:?}: {found}");
+        }
+    }
+}
+
+/// Means over strips of the ground beside the wall of [`corner`], a tenth of the radius wide, the nearest first: what is found, and the closed form.
+pub(crate) fn corner_profile(estimate: Estimate<'_>, radius_m: f32) -> Vec<[f64; 2]> {
+    let stage = corner();
+    let camera = look(Vec3::new(3.0, 2.5, 0.0), Vec3::new(0.5, 0.0, 0.0));
+    let (gbuffer, screen) = draw(&stage, &camera, [240, 240]);
+    let visibility = estimate(&screen);
+    let mut strips = [(0.0f64, 0.0f64, 0u32); 12];
+    for (i, &v) in visibility.iter().enumerate() {
+        let surface = gbuffer.surface(&stage.scene, &stage.pose, i);
+        let Some(surface) = surface.filter(|s| s.instance == 0) else { continue };
+        let x = surface.position_world.x;
+        if let Some(strip) = strips.get_mut((x / radius_m * 10.0) as usize).filter(|_| x > 0.0) {
+            strip.0 += f64::from(v);
+            strip.1 += beside_a_wall(f64::from(x), 3.0, f64::from(radius_m));
+            strip.2 += 1;
+        }
+    }
+    assert!(strips.iter().all(|strip| strip.2 > 200), "{strips:?}");
+    strips.map(|(v, truth, n)| [v, truth].map(|sum| sum / f64::from(n))).to_vec()
+}
+
+/// Pictures of any size, of any camera and of nothing have values 0 … 1, the background is open, and threads change nothing.
+pub(crate) fn check_pictures(estimate: Estimate<'_>) {
+    let stage = still_life();
+    let camera = look(Vec3::new(2.0, 2.5, 4.0), Vec3::ZERO);
+    let from_below = look(Vec3::new(0.3, 0.1, 1.5), Vec3::new(0.2, 3.0, 0.0));
+    for size in [[1, 1], [3, 7], [7, 3], [1, 40], [33, 1], [64, 48], [65, 47]] {
+        for camera in [&camera, &from_below] {
+            let (gbuffer, screen) = draw(&stage, camera, size);
+            let visibility = with_threads(1, || estimate(&screen));
+            assert_eq!(visibility.len(), (size[0] * size[1]) as usize);
+            for (value, sample) in visibility.iter().zip(gbuffer.samples()) {
+                assert!((0.0..=1.0).contains(value), "{size:?}: {value}");
+                assert!(sample.is_covered() || *value == 1.0, "{size:?}: background {value}");
+            }
+            assert_eq!(visibility, with_threads(3, || estimate(&screen)));
+        }
+    }
+    let (_, screen) = draw(&Stage::new(), &camera, [5, 4]);
+    assert_eq!(estimate(&screen), [1.0; 20]);
+}
+
+/// A far camera with a narrow lens sees what a parallel one does, up to `mean`.
+pub(crate) fn check_lenses(estimate: Estimate<'_>, mean: f32) {
+    let stage = still_life();
+    let (direction, far_m, half_height) = (Vec3::new(0.5, 0.6, 1.0).normalize(), 2000.0, 2.0f64);
+    let yfov = (2.0 * libm::atan(half_height / f64::from(far_m))) as f32;
+    let perspective = PosedCamera {
+        projection: Projection::Perspective { yfov, near: 1.0 },
+        ..look(direction * far_m, Vec3::ZERO)
+    };
+    let parallel = PosedCamera {
+        projection: Projection::Orthographic { half_height: half_height as f32, near: 0.0, far: 20.0 },
+        ..look(direction * 10.0, Vec3::ZERO)
+    };
+    let [a, b] = [perspective, parallel].map(|camera| {
+        let (_, screen) = draw(&stage, &camera, [120, 90]);
+        estimate(&screen)
+    });
+    let found = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).sum::<f32>() / a.len() as f32;
+    assert!(found < mean, "{found}");
+    assert!(b.iter().any(|&v| v < 0.9));
+}
