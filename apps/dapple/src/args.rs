@@ -247,17 +247,17 @@ pub(crate) enum RenderMethod {
     PsaoHat,
     /// Rays at every pixel: the truth.
     Rtao,
-    /// From the picture's depth and normals alone: random places.
+    /// Screen space: random places in a hemisphere, the defaults of Falcor.
     Ssao,
-    /// The same: AlchemyAO.
+    /// Screen space: AlchemyAO.
     Alchemy,
-    /// From depth alone: scalable ambient obscurance.
+    /// Screen space, from depth alone: Scalable Ambient Obscurance.
     Sao,
-    /// From depth and normals: horizons.
+    /// Screen space: horizons, HBAO.
     Hbao,
-    /// The same: HBAO+.
+    /// Screen space: HBAO+.
     HbaoPlus,
-    /// The same: slices with a visibility bitmask.
+    /// Screen space: GTAO with a visibility bitmask.
     Gtao,
     /// No occlusion.
     None,

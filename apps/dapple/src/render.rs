@@ -149,7 +149,9 @@ fn check(args: &RenderArgs) -> Result<()> {
         bail!("--time must be a finite number of seconds");
     }
     if args.view == View::Error && args.method == RenderMethod::Rtao {
-        bail!("--view error compares a method with rtao: choose --method psao, psao-hat, ssao or none");
+        bail!(
+            "--view error compares a method with rtao: choose --method psao, psao-hat, a screen-space one (as ssao) or none"
+        );
     }
     Ok(())
 }

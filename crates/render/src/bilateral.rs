@@ -11,11 +11,16 @@ pub(crate) struct Bilateral {
     pub(crate) taps: u32,
     /// Samples of the picture between two taps, 1 … 16.
     pub(crate) stride: u32,
-    /// What distances may differ by, as a part of the distance, before a neighbour counts nothing, > 0. Slopes are foretold: see [`Bilateral::smooth`].
-    pub(crate) tolerance: f32,
+    /// What distances may differ by before a neighbour counts nothing, metres, > 0. Slopes are foretold: see [`Bilateral::smooth`].
+    pub(crate) tolerance_m: f32,
 }
 
 impl Bilateral {
+    /// Of a method that looks so far around: what lies closer together than a fifth of that is one surface.
+    pub(crate) fn within(radius_m: f32, taps: u32) -> Bilateral {
+        Bilateral { taps, stride: 1, tolerance_m: 0.2 * radius_m }
+    }
+
     /// Smooths one value a sample. Whether a neighbour belongs to the same surface is asked of the difference between its distance and the one that the sample's
     /// own slope foretells, so that floors which are seen at a grazing angle are smoothed, too. The background stays as it is.
     pub(crate) fn smooth(&self, screen: &Screen, values: &[f32]) -> Vec<f32> {
@@ -67,13 +72,13 @@ impl Bilateral {
             let after = Some((at + step, step as f32)).filter(|(other, _)| *other < count);
             for (other, by) in [before, after].into_iter().flatten() {
                 let (value, found) = sample(other);
-                let off = (found - distance - slope * by).abs().min((found - distance).abs());
-                let weight = bell * (1.0 - off / (self.tolerance * distance)).max(0.0);
-                // An infinite distance has no weight.
-                if weight > 0.0 {
-                    sum += weight * value;
-                    weights += weight;
+                if !found.is_finite() {
+                    continue;
                 }
+                let off = (found - distance - slope * by).abs().min((found - distance).abs());
+                let weight = bell * (1.0 - off / self.tolerance_m).max(0.0);
+                sum += weight * value;
+                weights += weight;
             }
         }
         sum / weights

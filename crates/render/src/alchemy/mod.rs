@@ -23,15 +23,17 @@ const EPSILON_M2: f32 = 1e-4;
 pub struct AlchemyParams {
     /// Radius of the ball around a place in which others are looked at, metres, > 0; default 0.6 \[r\].
     pub radius_m: f32,
-    /// How much what is found darkens, as a part of the radius, ≥ 0; default 0.45 \[σ / r\].
+    /// How much what is found darkens, as a part of the radius, ≥ 0; default 0.5 \[σ / r\].
     pub sigma_of_radius: f32,
     /// How far what blocks must stand above the surface, as a part of the distance to the eye, ≥ 0; default 0.0001 \[β\].
     pub beta: f32,
+    /// The same as a part of the radius, ≥ 0; default 1/120: 5 mm at 0.6 m.
+    pub bias_of_radius: f32,
     /// Contrast: visibility to this power, > 0; default 1 \[k\].
     pub exponent: f32,
     /// Places looked at around each sample, 1 … [`MAX_SAMPLES`]; default 12 \[s\].
     pub samples: u32,
-    /// Turns of the spiral that they lie on; default 7.
+    /// Turns of the spiral that they lie on, any number; default 7.
     pub turns: u32,
     /// Taps of the blur on either side, 0 (none) … 16; default 6, a window of 13 × 13.
     pub blur_taps: u32,
@@ -41,8 +43,9 @@ impl Default for AlchemyParams {
     fn default() -> Self {
         AlchemyParams {
             radius_m: 0.6,
-            sigma_of_radius: 0.45,
+            sigma_of_radius: 0.5,
             beta: 1e-4,
+            bias_of_radius: 1.0 / 120.0,
             exponent: 1.0,
             samples: 12,
             turns: 7,
@@ -61,10 +64,12 @@ impl AlchemyParams {
         let not_negative = |value: f32| value >= 0.0 && value.is_finite();
         let samples = (1..=MAX_SAMPLES).contains(&self.samples);
         let sigma = self.sigma_of_radius;
-        let checks: [(&'static str, f64, bool, &'static str); 6] = [
+        let bias = self.bias_of_radius;
+        let checks: [(&'static str, f64, bool, &'static str); 7] = [
             ("alchemy: radius_m", self.radius_m.into(), positive(self.radius_m), "finite and above 0"),
             ("alchemy: sigma_of_radius", sigma.into(), not_negative(sigma), "finite and at least 0"),
             ("alchemy: beta", self.beta.into(), not_negative(self.beta), "finite and at least 0"),
+            ("alchemy: bias_of_radius", bias.into(), not_negative(bias), "finite and at least 0"),
             ("alchemy: exponent", self.exponent.into(), positive(self.exponent), "finite and above 0"),
             ("alchemy: samples", self.samples.into(), samples, "1 to 256"),
             ("alchemy: blur_taps", self.blur_taps.into(), self.blur_taps <= 16, "0 to 16"),
@@ -90,8 +95,7 @@ pub fn estimate_visibility(screen: &Screen, params: &AlchemyParams) -> Result<Ve
             *value = visibility_at(screen, params, [column, row]);
         }
     });
-    let blur = Bilateral { taps: params.blur_taps, stride: 1, tolerance: 0.02 };
-    Ok(blur.smooth(screen, &visibility))
+    Ok(Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility))
 }
 
 /// \[McGuire2012\] eq. 1.
@@ -109,7 +113,8 @@ fn visibility_at(screen: &Screen, params: &AlchemyParams, at: [usize; 2]) -> f32
         let seen = screen.neighbour(at, [radius * part * cos, radius * part * sin]);
         let Some(seen) = seen.and_then(|seen| screen.position_at(seen)) else { continue };
         let to_seen = seen - place;
-        let height = to_seen.dot(normal) - distance * params.beta;
+        let height =
+            to_seen.dot(normal) - params.bias_of_radius * params.radius_m - distance.max(0.0) * params.beta;
         sum += height.max(0.0) / (to_seen.length_squared() + EPSILON_M2);
     }
     let darkness = 2.0 * params.sigma_of_radius * params.radius_m / params.samples as f32 * sum;

@@ -123,11 +123,11 @@ impl Screen {
         is_before.then(|| origin + ray * along)
     }
 
-    /// The sample so many to the right and down of another, rounded towards it; `None` outside of the picture.
+    /// The sample that lies so many to the right and down of another's centre; `None` outside of the picture.
     pub fn neighbour(&self, [column, row]: [usize; 2], by: [f32; 2]) -> Option<[usize; 2]> {
-        let (column, row) = (column as i64 + by[0] as i64, row as i64 + by[1] as i64);
-        let inside =
-            (0..i64::from(self.columns)).contains(&column) && (0..i64::from(self.rows)).contains(&row);
+        let (column, row) = (column as f32 + 0.5 + by[0], row as f32 + 0.5 + by[1]);
+        // Not a number is outside, too.
+        let inside = column >= 0.0 && column < self.columns as f32 && row >= 0.0 && row < self.rows as f32;
         inside.then_some([column as usize, row as usize])
     }
 

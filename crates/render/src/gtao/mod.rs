@@ -30,8 +30,8 @@ pub struct GtaoParams {
     pub slices: u32,
     /// Steps to either side in each, 1 … [`MAX_STEPS`]; default 6.
     pub steps: u32,
-    /// How thick what the picture shows is taken to be, metres, > 0: what is behind that blocks nothing. Default 0.3.
-    pub thickness_m: f32,
+    /// How thick what the picture shows is taken to be, as a part of the radius, > 0: what is behind that blocks nothing. Default 0.5.
+    pub thickness_of_radius: f32,
     /// How far what blocks must stand above the surface, as a sine, 0 … 0.9; default 0.02.
     pub bias: f32,
     /// Taps of the blur on either side, 0 (none) … 16; default 3.
@@ -40,7 +40,7 @@ pub struct GtaoParams {
 
 impl Default for GtaoParams {
     fn default() -> Self {
-        GtaoParams { radius_m: 0.6, slices: 3, steps: 6, thickness_m: 0.3, bias: 0.02, blur_taps: 3 }
+        GtaoParams { radius_m: 0.6, slices: 3, steps: 6, thickness_of_radius: 0.5, bias: 0.02, blur_taps: 3 }
     }
 }
 
@@ -52,12 +52,12 @@ impl GtaoParams {
     pub fn check(&self) -> Result<(), RenderError> {
         let positive = |value: f32| value > 0.0 && value.is_finite();
         let counted = |value: u32| (1..=MAX_STEPS).contains(&value);
-        let bias = (0.0..=0.9).contains(&self.bias);
+        let (bias, thickness) = ((0.0..=0.9).contains(&self.bias), self.thickness_of_radius);
         let checks: [(&'static str, f64, bool, &'static str); 6] = [
             ("gtao: radius_m", self.radius_m.into(), positive(self.radius_m), "finite and above 0"),
             ("gtao: slices", self.slices.into(), counted(self.slices), "1 to 64"),
             ("gtao: steps", self.steps.into(), counted(self.steps), "1 to 64"),
-            ("gtao: thickness_m", self.thickness_m.into(), positive(self.thickness_m), "finite and above 0"),
+            ("gtao: thickness_of_radius", thickness.into(), positive(thickness), "finite and above 0"),
             ("gtao: bias", self.bias.into(), bias, "0 to 0.9"),
             ("gtao: blur_taps", self.blur_taps.into(), self.blur_taps <= 16, "0 to 16"),
         ];
@@ -82,7 +82,7 @@ pub fn estimate_visibility(screen: &Screen, params: &GtaoParams) -> Result<Vec<f
             *value = visibility_at(screen, params, [column, row]);
         }
     });
-    Ok(Bilateral { taps: params.blur_taps, stride: 1, tolerance: 0.02 }.smooth(screen, &visibility))
+    Ok(Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility))
 }
 
 fn visibility_at(screen: &Screen, params: &GtaoParams, at: [usize; 2]) -> f32 {
@@ -93,6 +93,7 @@ fn visibility_at(screen: &Screen, params: &GtaoParams, at: [usize; 2]) -> f32 {
     let eye = screen.towards_eye(place);
     let radius = params.radius_m * screen.samples_per_metre(-place.z);
     let (turn, jitter) = (interleaved_gradient(at), interleaved_gradient([at[1] + 57, at[0] + 23]));
+    let thickness_m = params.thickness_of_radius * params.radius_m;
     let (mut open, mut all) = (0.0, 0.0);
     for number in 0..params.slices {
         let angle = PI * (number as f32 + turn) / params.slices as f32;
@@ -110,8 +111,7 @@ fn visibility_at(screen: &Screen, params: &GtaoParams, at: [usize; 2]) -> f32 {
                 let to_seen = seen - place;
                 let above = normal.dot(to_seen) > params.bias * to_seen.length();
                 if above && to_seen.length_squared() <= params.radius_m * params.radius_m {
-                    blocked |=
-                        slice.sectors(to_seen, to_seen - screen.towards_eye(seen) * params.thickness_m, side);
+                    blocked |= slice.sectors(to_seen, to_seen - screen.towards_eye(seen) * thickness_m, side);
                 }
             }
         }

@@ -37,7 +37,7 @@ pub struct HbaoParams {
     pub directions: u32,
     /// Steps along each, 1 … [`MAX_STEPS`]; default 4 \[N_s\].
     pub steps: u32,
-    /// Angle over the surface under which nothing blocks, degrees, 0 … 89; default 5 for HBAO, 3 for HBAO+.
+    /// Angle over the surface under which nothing blocks, degrees, 0 … 89; default 4 for HBAO, 3 for HBAO+.
     pub bias_degrees: f32,
     /// What is found is multiplied by this, ≥ 0; default 1.8 for HBAO, 4 for HBAO+: chosen on the atrium, see `README.md`.
     pub strength: f32,
@@ -53,7 +53,7 @@ impl HbaoParams {
             radius_m: 0.6,
             directions: 8,
             steps: 4,
-            bias_degrees: 5.0,
+            bias_degrees: 4.0,
             strength: 1.8,
             blur_taps: 3,
         }
@@ -102,7 +102,7 @@ pub fn estimate_visibility(screen: &Screen, params: &HbaoParams) -> Result<Vec<f
             *value = 1.0 - (params.strength * occlusion_at(screen, params, [column, row])).clamp(0.0, 1.0);
         }
     });
-    Ok(Bilateral { taps: params.blur_taps, stride: 1, tolerance: 0.02 }.smooth(screen, &visibility))
+    Ok(Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility))
 }
 
 fn occlusion_at(screen: &Screen, params: &HbaoParams, at: [usize; 2]) -> f32 {
@@ -132,10 +132,10 @@ fn occlusion_at(screen: &Screen, params: &HbaoParams, at: [usize; 2]) -> f32 {
                 // Where the plane of the surface goes in that direction of the picture.
                 let (column, row) = (at[0] as f32 + 0.5 + cos, at[1] as f32 + 0.5 + sin);
                 let along = screen.on_plane(column, row, place, normal).map(|next| next - place);
-                // Samples lie beside the direction by up to half of one: the plane itself must not rise over itself for that.
+                // Samples lie beside the direction by up to half of one each way: the plane must not rise over itself for that.
                 let steps =
                     steps.filter(|(to_seen, _)| normal.dot(*to_seen) > libm::sinf(bias) * to_seen.length());
-                under_horizon(along.unwrap_or(Vec3::Z), bias, steps)
+                under_horizon(along.unwrap_or(Vec3::NEG_Z), bias, steps)
             }
             Horizon::Mean => mean_height(normal, libm::sinf(bias), steps) / params.steps as f32,
         };

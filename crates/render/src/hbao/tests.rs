@@ -6,7 +6,9 @@ use super::*;
 use crate::compose::view_visibility;
 use crate::gbuffer::rasterize;
 use crate::testing::check_golden;
-use crate::testing::screen::{check_lenses, check_pictures, check_walls, corner_profile, look, still_life};
+use crate::testing::screen::{
+    check_lenses, check_pictures, check_profile, check_walls, corner_profile, look, still_life,
+};
 
 fn estimate(params: HbaoParams) -> impl Fn(&Screen) -> Vec<f32> + Sync {
     move |screen| estimate_visibility(screen, &params).unwrap()
@@ -25,12 +27,7 @@ fn walls_are_open_pictures_are_pictures_and_lenses_agree() {
 fn a_corner_darkens_towards_its_edge() {
     for params in [HbaoParams::hbao(), HbaoParams::hbao_plus()] {
         let means = corner_profile(&estimate(params), 0.6);
-        for pair in means.windows(2).take(10) {
-            assert!(pair[0][0] <= pair[1][0] + 0.02, "{params:?}: {means:?}");
-        }
-        for (i, [found, truth]) in means.iter().enumerate() {
-            assert!((found - truth).abs() < 0.3, "{params:?}, strip {i}: {found}, the truth is {truth}");
-        }
+        check_profile(&means, 0.22);
     }
 }
 

@@ -17,13 +17,13 @@ pub struct SaoParams {
     pub sigma_m: Option<f32>,
     /// How far what blocks must stand above the surface, as a part of the distance to the eye, ≥ 0; default 0.0001 \[β\].
     pub beta: f32,
-    /// The same as a length, metres, ≥ 0; default 0.005.
-    pub bias_m: f32,
+    /// The same as a length, metres, ≥ 0; `None` (default) for [`SaoParams::BIAS_OF_RADIUS`] of the radius.
+    pub bias_m: Option<f32>,
     /// Contrast: visibility to this power, > 0; default 1 \[k\].
     pub exponent: f32,
     /// Places looked at around each sample, 1 … [`MAX_SAMPLES`]; default 9 \[s\].
     pub samples: u32,
-    /// Turns of the spiral that they lie on; default 7 \[τ\].
+    /// Turns of the spiral that they lie on, any number; default 7 \[τ\].
     pub turns: u32,
     /// How a level of the pyramid is made from the one below. Default: the rotated grid.
     pub filter: MipFilter,
@@ -43,11 +43,18 @@ pub struct SaoParams {
 
 impl SaoParams {
     /// Default \[σ\] as a part of the radius: chosen on the atrium, see `README.md`.
-    pub const SIGMA_OF_RADIUS: f32 = 0.45;
+    pub const SIGMA_OF_RADIUS: f32 = 0.5;
+    /// Default bias as a part of the radius: 5 mm at 0.6 m.
+    pub const BIAS_OF_RADIUS: f32 = 1.0 / 120.0;
 
     /// What darkens is multiplied by this, metres.
     pub fn sigma_m(&self) -> f32 {
         self.sigma_m.unwrap_or(SaoParams::SIGMA_OF_RADIUS * self.radius_m)
+    }
+
+    /// How far what blocks must stand above the surface, metres.
+    pub fn bias_m(&self) -> f32 {
+        self.bias_m.unwrap_or(SaoParams::BIAS_OF_RADIUS * self.radius_m)
     }
 
     /// Whether every parameter is in its range.
@@ -58,12 +65,12 @@ impl SaoParams {
         let positive = |value: f32| value > 0.0 && value.is_finite();
         let not_negative = |value: f32| value >= 0.0 && value.is_finite();
         let within = |value: u32, low: u32, high: u32| (low..=high).contains(&value);
-        let sigma = self.sigma_m();
+        let (sigma, bias) = (self.sigma_m(), self.bias_m());
         let checks: [(&'static str, f64, bool, &'static str); 12] = [
             ("sao: radius_m", self.radius_m.into(), positive(self.radius_m), "finite and above 0"),
             ("sao: sigma_m", sigma.into(), not_negative(sigma), "finite and at least 0"),
             ("sao: beta", self.beta.into(), not_negative(self.beta), "finite and at least 0"),
-            ("sao: bias_m", self.bias_m.into(), not_negative(self.bias_m), "finite and at least 0"),
+            ("sao: bias_m", bias.into(), not_negative(bias), "finite and at least 0"),
             ("sao: exponent", self.exponent.into(), positive(self.exponent), "finite and above 0"),
             ("sao: samples", self.samples.into(), within(self.samples, 1, MAX_SAMPLES), "1 to 256"),
             ("sao: levels", self.levels.into(), within(self.levels, 0, MAX_LEVELS), "0 to 12"),
@@ -86,7 +93,7 @@ impl Default for SaoParams {
             radius_m: 0.6,
             sigma_m: None,
             beta: 1e-4,
-            bias_m: 5e-3,
+            bias_m: None,
             exponent: 1.0,
             samples: 9,
             turns: 7,

@@ -69,16 +69,23 @@ impl Pyramid {
         self.levels.len()
     }
 
-    /// The distance at the texel of a level that a sample of the picture lies in, metres, and the sample that it stands for: with the rotated
-    /// grid the one that it is of, else the given one. The sample must be in the picture.
-    pub(super) fn read(&self, level: usize, [column, row]: [usize; 2]) -> (f32, [usize; 2]) {
+    /// The distance at the texel of a level that a sample of the picture lies in, metres, and the point of the picture that it stands for, as of
+    /// [`Screen::place_view`]: with the rotated grid the centre of the sample that it is of, else that of the texel's samples. The sample must be in the picture.
+    pub(super) fn read(&self, level: usize, [column, row]: [usize; 2]) -> (f32, [f32; 2]) {
         let Level { columns, rows, distances_m } = &self.levels[level];
         let texel = [column >> level, row >> level];
-        let distance = distances_m[texel[1] * columns + texel[0]];
         debug_assert!(texel[0] < *columns && texel[1] < *rows);
+        let distance = distances_m[texel[1] * columns + texel[0]];
         let stands_for = match self.filter {
-            MipFilter::RotatedGrid => self.source(level, texel),
-            _ => [column, row],
+            MipFilter::RotatedGrid => self.source(level, texel).map(|at| at as f32 + 0.5),
+            _ => {
+                let first = &self.levels[0];
+                let centre = |texel: usize, count: usize| {
+                    let (low, high) = (texel << level, ((texel + 1) << level).min(count));
+                    0.5 * (low + high) as f32
+                };
+                [centre(texel[0], first.columns), centre(texel[1], first.rows)]
+            }
         };
         (distance, stands_for)
     }

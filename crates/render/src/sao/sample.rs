@@ -71,8 +71,8 @@ fn visibility_at(
         if !seen_m.is_finite() {
             continue;
         }
-        let to_seen = screen.place_view(column as f32 + 0.5, row as f32 + 0.5, seen_m) - place;
-        let height = to_seen.dot(normal) - params.bias_m - distance * params.beta;
+        let to_seen = screen.place_view(column, row, seen_m) - place;
+        let height = to_seen.dot(normal) - params.bias_m() - distance.max(0.0) * params.beta;
         sum += height.max(0.0) / (to_seen.length_squared() + EPSILON_M2);
     }
     let darkness = 2.0 * params.sigma_m() / params.samples as f32 * sum;
@@ -80,8 +80,8 @@ fn visibility_at(
     if params.exponent == 1.0 { open } else { libm::powf(open, params.exponent) }
 }
 
-/// Eq. 4: the face's normal, from the places that a sample's quad of 2 × 2 shows. Towards the eye; along the view axis where the quad has no
-/// other sample.
+/// Eq. 4: the face's normal, from the places that a sample's quad of 2 × 2 shows. Towards the eye. A picture of one row or column, and an edge of the background, leave
+/// the picture's own axes.
 pub(crate) fn normal_view(screen: &Screen, [column, row]: [usize; 2]) -> Vec3 {
     let columns = screen.columns() as usize;
     let place = |column: usize, row: usize| {
@@ -89,7 +89,10 @@ pub(crate) fn normal_view(screen: &Screen, [column, row]: [usize; 2]) -> Vec3 {
         inside.then(|| screen.position_view(row * columns + column)).flatten()
     };
     let difference = |from: [usize; 2], to: [usize; 2]| Some(place(to[0], to[1])? - place(from[0], from[1])?);
-    let (left, top) = (column & !1, row & !1);
+    // The last of an odd row or column has no quad: its pair is the one before.
+    let first =
+        |at: usize, count: usize| if (at | 1) < count { at & !1 } else { (at & !1).saturating_sub(1) };
+    let (left, top) = (first(column, columns), first(row, screen.rows() as usize));
     let along_row = difference([left, row], [left + 1, row]).unwrap_or(Vec3::X);
     let down = difference([column, top], [column, top + 1]).unwrap_or(Vec3::NEG_Y);
     // Down the picture is −y.

@@ -44,24 +44,36 @@ pub(crate) fn beside_a_wall(d: f64, h: f64, r: f64) -> f64 {
     1.0 - (s(c) - a * s(c / a)) / std::f64::consts::PI
 }
 
-/// A plane seen at up to so many degrees, through both lenses, is this open at least.
+/// A plane seen at up to so many degrees from any side, through both lenses, before and behind a parallel camera's own place, is this open at least.
 pub(crate) fn check_walls(estimate: Estimate<'_>, steepest: f64, least: f32) {
     let mut stage = Stage::new();
     stage.add(ground(60.0), 0, Affine3A::IDENTITY);
-    for degrees in [0.0, 10.0, 45.0, 60.0, 75.0, 82.0f64].into_iter().filter(|d| *d <= steepest) {
+    let angles = [0.0, 10.0, 45.0, 60.0, 75.0, 82.0f64];
+    let cases = angles.into_iter().filter(|d| *d <= steepest).flat_map(|d| (0..4).map(move |turn| (d, turn)));
+    for (degrees, turn) in cases {
         let angle = degrees.to_radians();
         let eye = Vec3::new(libm::sin(angle) as f32, libm::cos(angle) as f32, 0.1) * 6.0;
+        let rolled = Affine3A::from_rotation_z(turn as f32 * std::f32::consts::FRAC_PI_2);
         for projection in [
             Projection::Perspective { yfov: 0.8, near: 0.02 },
             Projection::Orthographic { half_height: 1.5, near: 0.1, far: 90.0 },
+            Projection::Orthographic { half_height: 1.5, near: -90.0, far: 90.0 },
         ] {
-            let camera = PosedCamera { projection, ..look(eye, Vec3::ZERO) };
+            let mut camera = PosedCamera { projection, ..look(eye, Vec3::ZERO) };
+            if matches!(projection, Projection::Orthographic { near: -90.0, .. }) {
+                // It stands behind what it sees.
+                let back = Vec3::from(camera.world_from_view.matrix3.z_axis);
+                camera.world_from_view.translation -= glam::Vec3A::from(back * 16.0);
+            }
+            camera.world_from_view *= rolled;
             let (gbuffer, screen) = draw(&stage, &camera, [97, 61]);
             let visibility = estimate(&screen);
             let covered = gbuffer.samples().iter().filter(|s| s.is_covered()).count();
-            assert!(covered > 3000, "{degrees}: {covered}");
-            let found = visibility.iter().copied().fold(1.0, f32::min);
-            assert!(found >= least, "{degrees}, {projection:?}: {found}");
+            assert!(covered > 2500, "{degrees}, {turn}: {covered}");
+            // Not a number is not open, either.
+            let closed = visibility.iter().position(|v| !(*v >= least));
+            let found = closed.map(|i| (i % 97, i / 97, visibility[i]));
+            assert!(found.is_none(), "{degrees}, turned {turn} times, {projection:?}: {found:?}");
         }
     }
 }
@@ -84,7 +96,21 @@ pub(crate) fn corner_profile(estimate: Estimate<'_>, radius_m: f32) -> Vec<[f64;
         }
     }
     assert!(strips.iter().all(|strip| strip.2 > 200), "{strips:?}");
-    strips.map(|(v, truth, n)| [v, truth].map(|sum| sum / f64::from(n))).to_vec()
+    let means = strips.map(|(v, truth, n)| [v, truth].map(|sum| sum / f64::from(n))).to_vec();
+    println!("radius {radius_m}: {means:.2?}");
+    means
+}
+
+/// A profile falls towards the edge as the truth does: by as much, up to `within`, and nowhere farther from it than that.
+pub(crate) fn check_profile(means: &[[f64; 2]], within: f64) {
+    let falls = |k: usize| means[10][k] - means[0][k];
+    assert!((falls(0) - falls(1)).abs() < within, "{means:?}");
+    for (i, pair) in means.windows(2).take(10).enumerate() {
+        assert!(pair[0][0] <= pair[1][0] + 0.02, "strip {i}: {means:?}");
+    }
+    for (i, [found, truth]) in means.iter().enumerate() {
+        assert!((found - truth).abs() < within, "strip {i}: {found}, the truth is {truth}");
+    }
 }
 
 /// Pictures of any size, of any camera and of nothing have values 0 … 1, the background is open, and threads change nothing.
@@ -92,8 +118,13 @@ pub(crate) fn check_pictures(estimate: Estimate<'_>) {
     let stage = still_life();
     let camera = look(Vec3::new(2.0, 2.5, 4.0), Vec3::ZERO);
     let from_below = look(Vec3::new(0.3, 0.1, 1.5), Vec3::new(0.2, 3.0, 0.0));
+    // Its near plane lies behind its place, and things do, too.
+    let parallel = PosedCamera {
+        projection: Projection::Orthographic { half_height: 2.0, near: -3.0, far: 20.0 },
+        ..look(Vec3::new(0.5, 0.7, 0.4), Vec3::ZERO)
+    };
     for size in [[1, 1], [3, 7], [7, 3], [1, 40], [33, 1], [64, 48], [65, 47]] {
-        for camera in [&camera, &from_below] {
+        for camera in [&camera, &from_below, &parallel] {
             let (gbuffer, screen) = draw(&stage, camera, size);
             let visibility = with_threads(1, || estimate(&screen));
             assert_eq!(visibility.len(), (size[0] * size[1]) as usize);

@@ -18,7 +18,8 @@ const KNOWN = [
   [/^psao-mls/, "green", "diamond"],
   [/^psao-hat/, "vermilion", "square"],
   [/^psao-paper|^paper/, "orange", "down"],
-  [/^ssao/, "olive", "bar"],
+  [/^(ssao|sao|alchemy)/, "olive", "bar"],
+  [/^(hbao|gtao)/, "sky", "star"],
   [/^rtao/, "purple", "triangle"],
   [/^none$/, "gray", "cross"],
 ];
