@@ -163,3 +163,71 @@ impl Screen {
         inside.then(|| row as usize * self.columns as usize + column as usize)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::screen::{draw, look, still_life};
+
+    fn screens() -> [Screen; 2] {
+        [
+            Projection::Perspective { yfov: 0.8, near: 0.02 },
+            Projection::Orthographic { half_height: 2.0, near: -3.0, far: 20.0 },
+        ]
+        .map(|projection| {
+            let camera = PosedCamera { projection, ..look(Vec3::new(1.5, 2.0, 3.0), Vec3::ZERO) };
+            draw(&still_life(), &camera, [61, 37]).1
+        })
+    }
+
+    #[test]
+    fn neighbours_are_the_nearest_samples() {
+        for screen in screens() {
+            let at = |by: [f32; 2]| screen.neighbour([10, 20], by);
+            assert_eq!(at([0.0, 0.0]), Some([10, 20]));
+            assert_eq!(at([0.49, -0.49]), Some([10, 20]));
+            assert_eq!(at([0.51, -0.51]), Some([11, 19]));
+            assert_eq!(at([-10.4, 16.4]), Some([0, 36]));
+            for outside in [
+                [-10.6, 0.0],
+                [0.0, 16.6],
+                [50.6, 0.0],
+                [1e30, 0.0],
+                [f32::NAN, 0.0],
+                [f32::NEG_INFINITY, 0.0],
+            ] {
+                assert_eq!(at(outside), None, "{outside:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn places_planes_and_lengths_agree_with_the_lens() {
+        for screen in screens() {
+            let mut seen = 0;
+            for (column, row) in (1..60).flat_map(|c| (1..36).map(move |r| (c, r))) {
+                let Some(place) = screen.position_at([column, row]) else { continue };
+                let normal = screen.normals_view()[row * 61 + column];
+                let (x, y) = (column as f32 + 0.5, row as f32 + 0.5);
+                // Its own point of the picture meets its own plane there.
+                let own = screen.on_plane(x, y, place, normal).unwrap();
+                assert!(own.distance(place) < 1e-3, "{own}, {place}");
+                // So does any other, on the plane and where the picture says.
+                if let Some(other) =
+                    screen.on_plane(x + 0.7, y - 0.4, place, normal).filter(|p| p.length() < 20.0)
+                {
+                    assert!(normal.dot(other - place).abs() < 1e-3 * (1.0 + other.length()));
+                    assert!(screen.place_view(x + 0.7, y - 0.4, -other.z).distance(other) < 1e-3);
+                }
+                // A metre to the right is so many samples to the right.
+                let length = screen.samples_per_metre(-place.z);
+                let right = screen.place_view(x + length, y, -place.z);
+                assert!((right - place).distance(Vec3::X) < 1e-2, "{right}, {place}");
+                let eye = screen.towards_eye(place);
+                assert!((eye.length() - 1.0).abs() < 1e-5 && normal.dot(eye) > -1e-3);
+                seen += 1;
+            }
+            assert!(seen > 500, "{seen}");
+        }
+    }
+}

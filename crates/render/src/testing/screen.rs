@@ -70,8 +70,7 @@ pub(crate) fn check_walls(estimate: Estimate<'_>, steepest: f64, least: f32) {
             let visibility = estimate(&screen);
             let covered = gbuffer.samples().iter().filter(|s| s.is_covered()).count();
             assert!(covered > 2500, "{degrees}, {turn}: {covered}");
-            // Not a number is not open, either.
-            let closed = visibility.iter().position(|v| !(*v >= least));
+            let closed = visibility.iter().position(|v| *v < least || v.is_nan());
             let found = closed.map(|i| (i % 97, i / 97, visibility[i]));
             assert!(found.is_none(), "{degrees}, turned {turn} times, {projection:?}: {found:?}");
         }
