@@ -19,7 +19,8 @@ const KNOWN = [
   [/^psao-hat/, "vermilion", "square"],
   [/^psao-paper|^paper/, "orange", "down"],
   [/^(ssao|sao|alchemy)/, "olive", "bar"],
-  [/^(hbao|gtao)/, "sky", "star"],
+  [/^hbao/, "sky", "star"],
+  [/^gtao/, "green", "diamond"],
   [/^rtao/, "purple", "triangle"],
   [/^none$/, "gray", "cross"],
 ];
