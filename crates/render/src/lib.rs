@@ -15,6 +15,7 @@
 mod bilateral;
 mod error;
 mod noise;
+mod obscurance;
 mod projection;
 #[cfg(test)]
 mod testing;

@@ -5,18 +5,14 @@
 #[cfg(test)]
 mod tests;
 
-use rayon::prelude::*;
-
 use crate::RenderError;
 use crate::bilateral::Bilateral;
 use crate::gbuffer::Screen;
 use crate::noise::alchemy_turn;
+use crate::obscurance::Obscurance;
 
 /// Most places that are looked at around a sample.
 pub const MAX_SAMPLES: u32 = 256;
-
-/// Keeps the quotient of the estimator finite, square metres.
-const EPSILON_M2: f32 = 1e-4;
 
 /// How visibility is estimated. Names of the paper's symbols are in brackets.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,36 +84,36 @@ impl AlchemyParams {
 /// A parameter out of its range.
 pub fn estimate_visibility(screen: &Screen, params: &AlchemyParams) -> Result<Vec<f32>, RenderError> {
     params.check()?;
-    let columns = screen.columns() as usize;
-    let mut visibility = vec![1.0; screen.distances_m().len()];
-    visibility.par_chunks_mut(columns).enumerate().for_each(|(row, values)| {
-        for (column, value) in values.iter_mut().enumerate() {
-            *value = visibility_at(screen, params, [column, row]);
-        }
-    });
+    let estimator = Obscurance {
+        sigma_m: params.sigma_of_radius * params.radius_m,
+        bias_m: params.bias_of_radius * params.radius_m,
+        beta: params.beta,
+        exponent: params.exponent,
+        samples: params.samples,
+        turns: params.turns,
+    };
+    let spiral = estimator.spiral();
+    let visibility = screen.map(|at| visibility_at(screen, params.radius_m, &estimator, &spiral, at));
     Ok(Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility))
 }
 
-/// \[McGuire2012\] eq. 1.
-fn visibility_at(screen: &Screen, params: &AlchemyParams, at: [usize; 2]) -> f32 {
-    let index = at[1] * screen.columns() as usize + at[0];
-    let Some(place) = screen.position_view(index) else { return 1.0 };
-    let (normal, distance) = (screen.normals_view()[index], -place.z);
-    let radius = params.radius_m * screen.samples_per_metre(distance);
+fn visibility_at(
+    screen: &Screen,
+    radius_m: f32,
+    estimator: &Obscurance,
+    spiral: &[(f32, f32)],
+    at: [usize; 2],
+) -> f32 {
+    let Some(place) = screen.position_at(at) else { return 1.0 };
+    let normal = screen.normals_view()[at[1] * screen.columns() as usize + at[0]];
+    let radius = radius_m * screen.samples_per_metre(-place.z);
     let turn = alchemy_turn(at);
     let mut sum = 0.0;
-    for i in 0..params.samples {
-        let part = (i as f32 + 0.5) / params.samples as f32;
-        let angle = std::f32::consts::TAU * part * params.turns as f32 + turn;
-        let (sin, cos) = libm::sincosf(angle);
+    for (part, angle) in spiral {
+        let (sin, cos) = libm::sincosf(angle + turn);
         let seen = screen.neighbour(at, [radius * part * cos, radius * part * sin]);
         let Some(seen) = seen.and_then(|seen| screen.position_at(seen)) else { continue };
-        let to_seen = seen - place;
-        let height =
-            to_seen.dot(normal) - params.bias_of_radius * params.radius_m - distance.max(0.0) * params.beta;
-        sum += height.max(0.0) / (to_seen.length_squared() + EPSILON_M2);
+        sum += estimator.term(seen - place, normal, -place.z);
     }
-    let darkness = 2.0 * params.sigma_of_radius * params.radius_m / params.samples as f32 * sum;
-    let open = (1.0 - darkness).max(0.0);
-    if params.exponent == 1.0 { open } else { libm::powf(open, params.exponent) }
+    estimator.visibility(sum)
 }

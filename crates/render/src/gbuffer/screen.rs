@@ -123,6 +123,18 @@ impl Screen {
         is_before.then(|| origin + ray * along)
     }
 
+    /// A value for each sample, row-major from the top, by its column and row; in parallel by rows in the caller's rayon pool.
+    pub fn map(&self, value: impl Fn([usize; 2]) -> f32 + Sync) -> Vec<f32> {
+        let columns = self.columns as usize;
+        let mut values = vec![0.0; self.distances_m.len()];
+        values.par_chunks_mut(columns).enumerate().for_each(|(row, values)| {
+            for (column, out) in values.iter_mut().enumerate() {
+                *out = value([column, row]);
+            }
+        });
+        values
+    }
+
     /// The sample that lies so many to the right and down of another's centre; `None` outside of the picture.
     pub fn neighbour(&self, [column, row]: [usize; 2], by: [f32; 2]) -> Option<[usize; 2]> {
         let (column, row) = (column as f32 + 0.5 + by[0], row as f32 + 0.5 + by[1]);

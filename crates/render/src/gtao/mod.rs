@@ -7,13 +7,11 @@ mod tests;
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use glam::Vec3;
-use rayon::prelude::*;
-
 use crate::RenderError;
 use crate::bilateral::Bilateral;
 use crate::gbuffer::Screen;
 use crate::noise::interleaved_gradient;
+use glam::Vec3;
 
 /// Most slices, and most steps along each half of one.
 pub const MAX_STEPS: u32 = 64;
@@ -75,13 +73,7 @@ impl GtaoParams {
 /// A parameter out of its range.
 pub fn estimate_visibility(screen: &Screen, params: &GtaoParams) -> Result<Vec<f32>, RenderError> {
     params.check()?;
-    let columns = screen.columns() as usize;
-    let mut visibility = vec![1.0; screen.distances_m().len()];
-    visibility.par_chunks_mut(columns).enumerate().for_each(|(row, values)| {
-        for (column, value) in values.iter_mut().enumerate() {
-            *value = visibility_at(screen, params, [column, row]);
-        }
-    });
+    let visibility = screen.map(|at| visibility_at(screen, params, at));
     Ok(Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility))
 }
 

@@ -3,10 +3,9 @@
 use glam::Vec3;
 
 use super::*;
-use crate::compose::view_visibility;
-use crate::gbuffer::rasterize;
-use crate::testing::check_golden;
-use crate::testing::screen::{check_lenses, check_pictures, check_walls, corner_profile, look, still_life};
+use crate::testing::screen::{
+    check_golden_view, check_lenses, check_pictures, check_walls, corner_profile, look, still_life,
+};
 
 fn estimate(params: GtaoParams) -> impl Fn(&Screen) -> Vec<f32> + Sync {
     move |screen| estimate_visibility(screen, &params).unwrap()
@@ -84,11 +83,6 @@ fn parameters_out_of_range_are_named() {
 }
 
 #[test]
-fn golden_view() {
-    let stage = still_life();
-    let camera = look(Vec3::new(3.2, 2.4, 1.8), Vec3::new(0.5, 0.5, 0.0));
-    let gbuffer = rasterize(&stage.scene, &stage.pose, &camera, 80, 60, 2).unwrap();
-    let screen = gbuffer.screen(&stage.scene, &stage.pose, &camera).unwrap();
-    let visibility = estimate_visibility(&screen, &GtaoParams::default()).unwrap();
-    check_golden("gtao", "still-life", &view_visibility(&gbuffer, &visibility).unwrap());
+fn golden_views() {
+    check_golden_view("gtao", "still-life", &estimate(GtaoParams::default()));
 }

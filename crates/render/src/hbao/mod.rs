@@ -5,13 +5,11 @@
 #[cfg(test)]
 mod tests;
 
-use glam::Vec3;
-use rayon::prelude::*;
-
 use crate::RenderError;
 use crate::bilateral::Bilateral;
 use crate::gbuffer::Screen;
 use crate::noise::interleaved_gradient;
+use glam::Vec3;
 
 /// Most directions, and most steps along each.
 pub const MAX_STEPS: u32 = 64;
@@ -95,13 +93,8 @@ impl HbaoParams {
 /// A parameter out of its range.
 pub fn estimate_visibility(screen: &Screen, params: &HbaoParams) -> Result<Vec<f32>, RenderError> {
     params.check()?;
-    let columns = screen.columns() as usize;
-    let mut visibility = vec![1.0; screen.distances_m().len()];
-    visibility.par_chunks_mut(columns).enumerate().for_each(|(row, values)| {
-        for (column, value) in values.iter_mut().enumerate() {
-            *value = 1.0 - (params.strength * occlusion_at(screen, params, [column, row])).clamp(0.0, 1.0);
-        }
-    });
+    let visibility =
+        screen.map(|at| 1.0 - (params.strength * occlusion_at(screen, params, at)).clamp(0.0, 1.0));
     Ok(Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility))
 }
 

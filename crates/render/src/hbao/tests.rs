@@ -1,13 +1,8 @@
 //! What HBAO, and HBAO+, keeps to: the general rules of screen-space methods, and a corner.
 
-use glam::Vec3;
-
 use super::*;
-use crate::compose::view_visibility;
-use crate::gbuffer::rasterize;
-use crate::testing::check_golden;
 use crate::testing::screen::{
-    check_lenses, check_pictures, check_profile, check_walls, corner_profile, look, still_life,
+    check_golden_view, check_lenses, check_pictures, check_profile, check_walls, corner_profile,
 };
 
 fn estimate(params: HbaoParams) -> impl Fn(&Screen) -> Vec<f32> + Sync {
@@ -48,12 +43,6 @@ fn parameters_out_of_range_are_named() {
 
 #[test]
 fn golden_views() {
-    let stage = still_life();
-    let camera = look(Vec3::new(3.2, 2.4, 1.8), Vec3::new(0.5, 0.5, 0.0));
-    let gbuffer = rasterize(&stage.scene, &stage.pose, &camera, 80, 60, 2).unwrap();
-    let screen = gbuffer.screen(&stage.scene, &stage.pose, &camera).unwrap();
-    for (name, params) in [("hbao", HbaoParams::hbao()), ("hbao-plus", HbaoParams::hbao_plus())] {
-        let visibility = estimate_visibility(&screen, &params).unwrap();
-        check_golden("hbao", name, &view_visibility(&gbuffer, &visibility).unwrap());
-    }
+    check_golden_view("hbao", "hbao", &estimate(HbaoParams::hbao()));
+    check_golden_view("hbao", "hbao-plus", &estimate(HbaoParams::hbao_plus()));
 }

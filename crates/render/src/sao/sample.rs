@@ -6,9 +6,7 @@ use rayon::prelude::*;
 use super::{Pyramid, SaoParams};
 use crate::gbuffer::Screen;
 use crate::noise::alchemy_turn;
-
-/// Keeps the quotient of eq. 1 finite, square metres.
-const EPSILON_M2: f32 = 1e-4;
+use crate::obscurance::Obscurance;
 
 /// Samples that are farther apart than this along the view axis are not averaged in a quad, metres.
 const QUAD_EDGE_M: f32 = 0.02;
@@ -16,68 +14,44 @@ const QUAD_EDGE_M: f32 = 0.02;
 /// Visibility by eq. 1 of each sample, row-major from the top, noisy: 0 … 1, and 1 for the background. The parameters must have passed
 /// [`SaoParams::check`], the pyramid be that of the picture.
 pub fn sample_obscurance(screen: &Screen, pyramid: &Pyramid, params: &SaoParams) -> Vec<f32> {
-    let columns = screen.columns() as usize;
-    let spiral = Spiral::new(params);
-    let mut visibility = vec![1.0; screen.distances_m().len()];
-    visibility.par_chunks_mut(columns).enumerate().for_each(|(row, values)| {
-        for (column, value) in values.iter_mut().enumerate() {
-            if let Some(place) = screen.position_view(row * columns + column) {
-                let normal = normal_view(screen, [column, row]);
-                *value = visibility_at(screen, pyramid, params, &spiral, [column, row], place, normal);
-            }
-        }
-    });
-    visibility
-}
-
-/// Lengths and angles of the places, the same around each sample.
-struct Spiral {
-    /// Part of the radius, and angle in radians.
-    steps: Vec<(f32, f32)>,
-}
-
-impl Spiral {
-    /// Eq. 6.
-    fn new(params: &SaoParams) -> Spiral {
-        let step = |i: u32| {
-            let part = (i as f32 + 0.5) / params.samples as f32;
-            (part, std::f32::consts::TAU * part * params.turns as f32)
-        };
-        Spiral { steps: (0..params.samples).map(step).collect() }
-    }
+    let estimator = Obscurance {
+        sigma_m: params.sigma_m(),
+        bias_m: params.bias_m(),
+        beta: params.beta,
+        exponent: params.exponent,
+        samples: params.samples,
+        turns: params.turns,
+    };
+    let spiral = estimator.spiral();
+    screen.map(|at| visibility_at(screen, pyramid, params, &estimator, &spiral, at))
 }
 
 fn visibility_at(
     screen: &Screen,
     pyramid: &Pyramid,
     params: &SaoParams,
-    spiral: &Spiral,
+    estimator: &Obscurance,
+    spiral: &[(f32, f32)],
     at: [usize; 2],
-    place: Vec3,
-    normal: Vec3,
 ) -> f32 {
-    let distance = -place.z;
-    let radius = params.radius_m * screen.samples_per_metre(distance);
+    let Some(place) = screen.position_at(at) else { return 1.0 };
+    let normal = normal_view(screen, at);
+    let radius = params.radius_m * screen.samples_per_metre(-place.z);
     let turn = alchemy_turn(at);
     let top = pyramid.levels() - 1;
     let mut sum = 0.0;
-    for (part, angle) in &spiral.steps {
+    for (part, angle) in spiral {
         let length = radius * part;
         let (sin, cos) = libm::sincosf(angle + turn);
         let Some(seen) = screen.neighbour(at, [length * cos, length * sin]) else { continue };
         // Eq. 9: the higher the farther it is on the screen.
         let level = (length as u32).checked_ilog2().unwrap_or(0).saturating_sub(params.switch_log2);
         let (seen_m, [column, row]) = pyramid.read((level as usize).min(top), seen);
-        if !seen_m.is_finite() {
-            continue;
+        if seen_m.is_finite() {
+            sum += estimator.term(screen.place_view(column, row, seen_m) - place, normal, -place.z);
         }
-        let to_seen = screen.place_view(column, row, seen_m) - place;
-        let height = to_seen.dot(normal) - params.bias_m() - distance.max(0.0) * params.beta;
-        sum += height.max(0.0) / (to_seen.length_squared() + EPSILON_M2);
     }
-    let darkness = 2.0 * params.sigma_m() / params.samples as f32 * sum;
-    let open = (1.0 - darkness).max(0.0);
-    if params.exponent == 1.0 { open } else { libm::powf(open, params.exponent) }
+    estimator.visibility(sum)
 }
 
 /// Eq. 4: the face's normal, from the places that a sample's quad of 2 × 2 shows. Towards the eye. A picture of one row or column, and an edge of the background, leave

@@ -4,11 +4,9 @@ use glam::Vec3;
 use proptest::prelude::*;
 
 use super::*;
-use crate::compose::view_visibility;
-use crate::gbuffer::rasterize;
-use crate::testing::check_golden;
 use crate::testing::screen::{
-    check_lenses, check_pictures, check_profile, check_walls, corner_profile, draw, look, still_life,
+    check_golden_view, check_lenses, check_pictures, check_profile, check_walls, corner_profile, draw, look,
+    still_life,
 };
 
 fn estimate(params: SaoParams) -> impl Fn(&Screen) -> Vec<f32> + Sync {
@@ -168,11 +166,6 @@ proptest! {
 }
 
 #[test]
-fn golden_view() {
-    let stage = still_life();
-    let camera = look(Vec3::new(3.2, 2.4, 1.8), Vec3::new(0.5, 0.5, 0.0));
-    let gbuffer = rasterize(&stage.scene, &stage.pose, &camera, 80, 60, 2).unwrap();
-    let screen = gbuffer.screen(&stage.scene, &stage.pose, &camera).unwrap();
-    let visibility = estimate_visibility(&screen, &SaoParams::default()).unwrap();
-    check_golden("sao", "still-life", &view_visibility(&gbuffer, &visibility).unwrap());
+fn golden_views() {
+    check_golden_view("sao", "still-life", &estimate(SaoParams::default()));
 }

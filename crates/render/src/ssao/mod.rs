@@ -74,12 +74,9 @@ pub fn estimate_visibility(screen: &Screen, params: &SsaoParams) -> Result<Vec<f
     params.check()?;
     let pattern = Pattern::new(params.samples, params.seed);
     let columns = screen.columns() as usize;
-    let mut occlusion = vec![0.0; screen.distances_m().len()];
-    occlusion.par_chunks_mut(columns).enumerate().for_each(|(row, values)| {
-        for (column, value) in values.iter_mut().enumerate() {
-            let turn = pattern.turn(column, row);
-            *value = occlusion_at(screen, row * columns + column, &pattern.offsets, turn, params);
-        }
+    let occlusion = screen.map(|[column, row]| {
+        let turn = pattern.turn(column, row);
+        occlusion_at(screen, row * columns + column, &pattern.offsets, turn, params)
     });
     // Blurred as occlusion, so that what is open stays exactly 1.
     let mut visibility = blur::blur(&occlusion, columns, params.blur_width, params.blur_sigma);

@@ -5,56 +5,17 @@ use glam::{Affine3A, Vec3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::compose::view_visibility;
-use crate::gbuffer::{GBuffer, rasterize};
-use crate::testing::{Stage, check_golden, cube, ground, quad, sphere, turned, with_threads};
+use crate::testing::screen::{beside_a_wall, check_golden_view, check_walls, corner, draw, look, still_life};
+use crate::testing::{Stage, cube, ground, sphere, turned, with_threads};
 
-fn look(eye: Vec3, target: Vec3) -> PosedCamera {
-    PosedCamera::look_at(eye, target, 0.8)
-}
-
-fn draw(stage: &Stage, camera: &PosedCamera, [width, height]: [u32; 2]) -> (GBuffer, Screen) {
-    let gbuffer = rasterize(&stage.scene, &stage.pose, camera, width, height, 1).unwrap();
-    let screen = gbuffer.screen(&stage.scene, &stage.pose, camera).unwrap();
-    (gbuffer, screen)
-}
-
-/// An endless ground, and an endless wall of height 3 on it at x = 0 that faces +x.
-fn corner() -> Stage {
-    let mut stage = Stage::new();
-    stage.add(ground(40.0), 0, Affine3A::IDENTITY);
-    let at = |y: f32, z: f32| Vec3::new(0.0, y, z);
-    stage.add(quad([at(0.0, 40.0), at(0.0, -40.0), at(3.0, -40.0), at(3.0, 40.0)]), 0, Affine3A::IDENTITY);
-    stage
-}
-
-/// Visibility of the ground at distance `d` from an endless wall of height `h`, rays of length `r`: `ARCHITECTURE.md`.
-fn beside_a_wall(d: f64, h: f64, r: f64) -> f64 {
-    let s = |c: f64| if c >= 1.0 { 0.0 } else { libm::acos(c) - c * (1.0 - c * c).sqrt() };
-    let (c, a) = (d / r, d / (d * d + h * h).sqrt());
-    1.0 - (s(c) - a * s(c / a)) / std::f64::consts::PI
+/// With defaults.
+fn estimate(screen: &Screen) -> Vec<f32> {
+    estimate_visibility(screen, &SsaoParams::default()).unwrap()
 }
 
 #[test]
 fn a_wall_is_open_at_any_angle() {
-    let mut stage = Stage::new();
-    stage.add(ground(60.0), 0, Affine3A::IDENTITY);
-    for degrees in [0.0, 10.0, 45.0, 60.0, 75.0, 82.0f64] {
-        let angle = degrees.to_radians();
-        let eye = Vec3::new(libm::sin(angle) as f32, libm::cos(angle) as f32, 0.1) * 6.0;
-        for projection in [
-            Projection::Perspective { yfov: 0.8, near: 0.02 },
-            Projection::Orthographic { half_height: 1.5, near: 0.1, far: 90.0 },
-        ] {
-            let camera = PosedCamera { projection, ..look(eye, Vec3::ZERO) };
-            let (gbuffer, screen) = draw(&stage, &camera, [97, 61]);
-            let visibility = estimate_visibility(&screen, &SsaoParams::default()).unwrap();
-            let covered = gbuffer.samples().iter().filter(|s| s.is_covered()).count();
-            assert!(covered > 3000, "{degrees}: {covered}");
-            let least = visibility.iter().copied().fold(1.0, f32::min);
-            assert!(least >= 0.999, "{degrees}, {projection:?}: {least}");
-        }
-    }
+    check_walls(&estimate, 90.0, 0.999);
 }
 
 #[test]
@@ -250,24 +211,7 @@ proptest! {
     }
 }
 
-/// A sphere and a box in a corner.
-fn still_life() -> Stage {
-    let mut stage = corner();
-    stage.add(
-        sphere(24, 32),
-        0,
-        Affine3A::from_translation(Vec3::new(0.9, 0.5, 0.6)) * Affine3A::from_scale(Vec3::splat(0.5)),
-    );
-    stage.add(cube(), 0, turned(0.7, Vec3::new(1.0, 0.4, -0.7)) * Affine3A::from_scale(Vec3::splat(0.4)));
-    stage
-}
-
 #[test]
 fn golden_view() {
-    let stage = still_life();
-    let camera = look(Vec3::new(3.2, 2.4, 1.8), Vec3::new(0.5, 0.5, 0.0));
-    let gbuffer = rasterize(&stage.scene, &stage.pose, &camera, 80, 60, 2).unwrap();
-    let screen = gbuffer.screen(&stage.scene, &stage.pose, &camera).unwrap();
-    let visibility = estimate_visibility(&screen, &SsaoParams::default()).unwrap();
-    check_golden("ssao", "still-life", &view_visibility(&gbuffer, &visibility).unwrap());
+    check_golden_view("ssao", "still-life", &estimate);
 }
