@@ -21,6 +21,11 @@ impl Bilateral {
         Bilateral { taps, stride: 1, tolerance_m: 0.2 * radius_m }
     }
 
+    /// Standard deviation of the taps' bell, in taps.
+    pub(crate) fn sigma_taps(&self) -> f64 {
+        0.5 * f64::from(self.taps) + 0.5
+    }
+
     /// Smooths one value a sample. Whether a neighbour belongs to the same surface is asked of the difference between its distance and the one that the sample's
     /// own slope foretells, so that floors which are seen at a grazing angle are smoothed, too. The background stays as it is.
     pub(crate) fn smooth(&self, screen: &Screen, values: &[f32]) -> Vec<f32> {
@@ -30,7 +35,7 @@ impl Bilateral {
         }
         let bell: Vec<f32> = (0..=self.taps)
             .map(|tap| {
-                let x = f64::from(tap) / (0.5 * f64::from(self.taps) + 0.5);
+                let x = f64::from(tap) / self.sigma_taps();
                 libm::exp(-0.5 * x * x) as f32
             })
             .collect();

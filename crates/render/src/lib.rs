@@ -31,6 +31,7 @@ pub mod hbao;
 pub mod image;
 pub mod psao;
 pub mod sao;
+pub mod screen_space;
 pub mod shade;
 pub mod ssao;
 

@@ -51,6 +51,17 @@ impl Default for AlchemyParams {
 }
 
 impl AlchemyParams {
+    pub(crate) fn estimator(&self) -> Obscurance {
+        Obscurance {
+            sigma_m: self.sigma_of_radius * self.radius_m,
+            bias_m: self.bias_of_radius * self.radius_m,
+            beta: self.beta,
+            exponent: self.exponent,
+            samples: self.samples,
+            turns: self.turns,
+        }
+    }
+
     /// Whether every parameter is in its range.
     ///
     /// # Errors
@@ -84,14 +95,7 @@ impl AlchemyParams {
 /// A parameter out of its range.
 pub fn estimate_visibility(screen: &Screen, params: &AlchemyParams) -> Result<Vec<f32>, RenderError> {
     params.check()?;
-    let estimator = Obscurance {
-        sigma_m: params.sigma_of_radius * params.radius_m,
-        bias_m: params.bias_of_radius * params.radius_m,
-        beta: params.beta,
-        exponent: params.exponent,
-        samples: params.samples,
-        turns: params.turns,
-    };
+    let estimator = params.estimator();
     let spiral = estimator.spiral();
     let visibility = screen.map(|at| visibility_at(screen, params.radius_m, &estimator, &spiral, at));
     Ok(Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility))

@@ -7,7 +7,7 @@ use super::ForwardError;
 use super::inputs::{Drawn, FrameInputs, Transparency, View, ViewKind};
 use super::layouts::{self, Growing};
 use super::lookup::{Lookup, LookupId, built_in};
-use super::pipelines::{CasterPipelines, DEPTH_FORMAT, PipelineKey, Pipelines};
+use super::pipelines::{CasterPipelines, DEPTH_FORMAT, PipelineKey, Pipelines, Stage};
 use super::scene::{CHARTS_SLOT, DETAIL_SLOT, GEOMETRY_SLOT, GpuScene, INSTANCE_SLOT, is_outside};
 use super::shadow::{FrameLights, ShadowAtlas, runs};
 use super::uniforms::{FrameUniform, InstanceRaw, LightsUniform};
@@ -15,23 +15,25 @@ use super::view::{ViewCamera, background, frame_uniform, inspection_background};
 use crate::gbuffer::check_scene;
 
 /// Bytes between the uniforms of two views.
-const FRAME_STRIDE: usize = 256;
+pub(super) const FRAME_STRIDE: usize = 256;
 
 /// The forward pass for one format of target. Keeps what it makes from frame to frame.
 #[derive(Debug)]
 pub struct Forward {
     format: wgpu::TextureFormat,
     samples: u32,
-    pipelines: Pipelines,
+    pub(super) pipelines: Pipelines,
     casters: CasterPipelines,
     lookup_groups: Vec<Option<wgpu::BindGroup>>,
     needs_group: Vec<bool>,
-    frame_layout: wgpu::BindGroupLayout,
+    pub(super) frame_layout: wgpu::BindGroupLayout,
     error_layout: wgpu::BindGroupLayout,
     frames: Growing,
-    lights: Growing,
+    pub(super) lights: Growing,
     frame_group: wgpu::BindGroup,
-    shadows: ShadowAtlas,
+    /// Uniforms of [`Forward::draw_geometry`].
+    pub(super) geometry_frames: Growing,
+    pub(super) shadows: ShadowAtlas,
     targets: Option<Targets>,
     comparison: Option<Comparison>,
 }
@@ -55,12 +57,21 @@ struct Comparison {
 
 /// One draw call.
 #[derive(Clone, Copy)]
-struct Draw {
+pub(super) struct Draw {
     key: PipelineKey,
     mesh: usize,
     part: usize,
     first: u32,
     end: u32,
+}
+
+/// What a list of draw calls is for.
+#[derive(Clone, Copy)]
+pub(super) struct Wants {
+    pub(super) stage: Stage,
+    /// Whether materials whose alpha is blended are mixed, not cut out.
+    pub(super) blends: bool,
+    pub(super) inspects: bool,
 }
 
 /// A view that shows the difference of two look-ups, and what each of them draws.
@@ -106,6 +117,7 @@ impl Forward {
             frame_group: frame_group(gpu, &frame_layout, &frames, &lights, &shadows),
             error_layout: layouts::error(&gpu.device),
             frame_layout,
+            geometry_frames: Growing::new(&gpu.device, "geometry frames", FRAME_STRIDE as u64, uniform),
             frames,
             lights,
             shadows,
@@ -163,9 +175,14 @@ impl Forward {
         let mut lists = Vec::with_capacity(inputs.views.len());
         let mut compared = Vec::new();
         for (view, camera) in inputs.views.iter().zip(&cameras) {
-            let list = self.list(gpu, scene, inputs, view, camera, view.lookup);
+            let wants = |lookup: LookupId| Wants {
+                stage: Stage::Picture(lookup.0),
+                blends: inputs.transparency == Transparency::Blend && view.kind.is_lit(),
+                inspects: !view.kind.is_lit(),
+            };
+            let list = self.list(gpu, scene, camera, wants(view.lookup));
             if let ViewKind::Error { other } = view.kind {
-                let other = self.list(gpu, scene, inputs, view, camera, other);
+                let other = self.list(gpu, scene, camera, wants(other));
                 compared.push(Compared { view, camera, lists: [list.clone(), other] });
             }
             lists.push(list);
@@ -181,7 +198,7 @@ impl Forward {
                 drawn.draws += 1;
                 continue;
             }
-            let (draws, triangles) = self.run(&mut pass, scene, camera, list);
+            let (draws, triangles) = self.run(&mut pass, scene, &self.frame_group, camera, list);
             drawn.draws += draws;
             drawn.triangles += triangles;
             if let (ViewKind::Points, Some(points)) =
@@ -306,18 +323,15 @@ impl Forward {
     }
 
     /// The draw calls of one view, opaque ones first; their pipelines are made.
-    fn list(
+    pub(super) fn list(
         &mut self,
         gpu: &Gpu,
         scene: &GpuScene,
-        inputs: &FrameInputs<'_>,
-        view: &View<'_>,
         camera: &ViewCamera,
-        lookup: LookupId,
+        wants: Wants,
     ) -> Vec<Draw> {
         let mut opaque: Vec<(f32, Draw)> = Vec::new();
         let mut blended: Vec<(f32, Draw)> = Vec::new();
-        let blends = inputs.transparency == Transparency::Blend && view.kind.is_lit();
         for batch in &scene.batches {
             let mesh = &scene.meshes[batch.mesh];
             let seen = |slot: u32| {
@@ -329,15 +343,15 @@ impl Forward {
                 let nearest = (first..end).map(distance).fold(f32::INFINITY, f32::min);
                 for (part, range) in mesh.parts.iter().enumerate() {
                     let material = &scene.materials[range.material as usize];
-                    let is_blended = blends && material.alpha == AlphaMode::Blend;
+                    let is_blended = wants.blends && material.alpha == AlphaMode::Blend;
                     let key = PipelineKey {
-                        lookup: lookup.0,
+                        stage: wants.stage,
                         detailed: mesh.detail.is_some(),
                         mirrored: batch.mirrored,
                         two_sided: material.two_sided,
                         cuts_holes: !is_blended && material.alpha != AlphaMode::Opaque,
                         blends: is_blended,
-                        inspects: !view.kind.is_lit(),
+                        inspects: wants.inspects,
                     };
                     self.pipelines.prepare(gpu, key);
                     let draw = Draw { key, mesh: batch.mesh, part, first, end };
@@ -358,16 +372,21 @@ impl Forward {
     }
 
     /// Draws a list; returns the number of calls and of triangles.
-    fn run(
+    pub(super) fn run(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         scene: &GpuScene,
+        frame_group: &wgpu::BindGroup,
         camera: &ViewCamera,
         list: &[Draw],
     ) -> (u32, u64) {
-        pass.set_bind_group(0, &self.frame_group, &[camera.index * FRAME_STRIDE as u32]);
+        pass.set_bind_group(0, frame_group, &[camera.index * FRAME_STRIDE as u32]);
         pass.set_bind_group(2, &scene.group, &[]);
-        if let Some(group) = list.first().and_then(|draw| self.lookup_groups[draw.key.lookup].as_ref()) {
+        let lookup = list.first().and_then(|draw| match draw.key.stage {
+            Stage::Picture(lookup) => self.lookup_groups[lookup].as_ref(),
+            Stage::Geometry => None,
+        });
+        if let Some(group) = lookup {
             pass.set_bind_group(3, group, &[]);
         }
         let stride = size_of::<InstanceRaw>() as u64;
@@ -428,7 +447,7 @@ impl Forward {
             let mut pass = self.begin(encoder, picture, inspection_background());
             for Compared { view, camera, lists } in compared {
                 camera.apply(&mut pass, view);
-                self.run(&mut pass, scene, camera, &lists[which]);
+                self.run(&mut pass, scene, &self.frame_group, camera, &lists[which]);
             }
         }
     }
@@ -453,7 +472,7 @@ fn texture(
     })
 }
 
-fn frame_group(
+pub(super) fn frame_group(
     gpu: &Gpu,
     layout: &wgpu::BindGroupLayout,
     frames: &Growing,

@@ -6,6 +6,7 @@
 mod atlas;
 mod draw;
 mod error;
+mod geometry;
 mod inputs;
 mod layouts;
 mod lookup;
@@ -21,6 +22,7 @@ mod view;
 pub use atlas::{AtlasBand, AtlasTexture};
 pub use draw::Forward;
 pub use error::ForwardError;
+pub use geometry::GeometryTarget;
 pub use inputs::{Drawn, FrameInputs, Rect, Transparency, View, ViewKind};
 pub use lookup::{LOOKUP_INPUT_WGSL, Lookup, LookupId};
 pub use points::GpuPoints;

@@ -14,6 +14,8 @@ pub(super) const FRAME_WGSL: &str = include_str!("wgsl/frame.wgsl");
 pub(super) const DEFORM_WGSL: &str = include_str!("wgsl/deform.wgsl");
 pub(super) const MATERIAL_WGSL: &str = include_str!("wgsl/material.wgsl");
 pub(super) const RAMP_WGSL: &str = include_str!("wgsl/ramp.wgsl");
+/// Of the normals of [`super::Forward::draw_geometry`].
+pub(super) const NORMAL_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgb10a2Unorm;
 pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 /// The files of the forward pass with one look-up.
@@ -35,6 +37,18 @@ pub(super) fn forward_module(lookup: &Lookup) -> String {
     join(&files)
 }
 
+/// The files of the pass that screen-space methods begin with.
+pub(super) fn geometry_module() -> String {
+    join(&[
+        FRAME_WGSL,
+        MATH_WGSL,
+        DEFORM_WGSL,
+        MATERIAL_WGSL,
+        include_str!("wgsl/vertex.wgsl"),
+        include_str!("wgsl/geometry.wgsl"),
+    ])
+}
+
 /// The files of the shadow maps.
 pub(super) fn caster_module() -> String {
     join(&[MATH_WGSL, DEFORM_WGSL, MATERIAL_WGSL, include_str!("wgsl/caster.wgsl")])
@@ -53,10 +67,19 @@ pub(super) fn error_module() -> String {
     join(&[RAMP_WGSL, include_str!("wgsl/error.wgsl")])
 }
 
+/// What meshes are drawn for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Stage {
+    /// A picture, its visibility by one of the look-ups.
+    Picture(usize),
+    /// Normals and depths ([`super::geometry`]).
+    Geometry,
+}
+
 /// What tells one pipeline of the forward pass from another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct PipelineKey {
-    pub(super) lookup: usize,
+    pub(super) stage: Stage,
     pub(super) detailed: bool,
     pub(super) mirrored: bool,
     pub(super) two_sided: bool,
@@ -70,14 +93,15 @@ pub(super) struct PipelineKey {
 pub(super) struct Pipelines {
     format: wgpu::TextureFormat,
     samples: u32,
-    lookups: Vec<LookupPipelines>,
+    lookups: Vec<StagePipelines>,
+    geometry: StagePipelines,
     made: BTreeMap<PipelineKey, wgpu::RenderPipeline>,
     pub(super) points: wgpu::RenderPipeline,
     pub(super) error: wgpu::RenderPipeline,
 }
 
 #[derive(Debug)]
-struct LookupPipelines {
+struct StagePipelines {
     module: wgpu::ShaderModule,
     layout: wgpu::PipelineLayout,
     needs_rest: bool,
@@ -87,26 +111,26 @@ impl Pipelines {
     pub(super) fn new(gpu: &Gpu, format: wgpu::TextureFormat, samples: u32, lookups: &[Lookup]) -> Pipelines {
         let device = &gpu.device;
         let groups = [layouts::frame(device), layouts::material(device), layouts::surface(device)];
-        let lookups = lookups.iter().map(|lookup| {
-            let mut layouts: Vec<_> = groups.iter().map(Some).collect();
-            if let Some(layout) = &lookup.layout {
-                layouts.push(Some(layout));
-            }
-            LookupPipelines {
-                module: shader_module(device, lookup.label, &forward_module(lookup)),
+        let stage = |label, wgsl: &str, needs_rest, own: Option<&wgpu::BindGroupLayout>| {
+            let layouts: Vec<_> = groups.iter().chain(own).map(Some).collect();
+            StagePipelines {
+                module: shader_module(device, label, wgsl),
                 layout: device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                    label: Some(lookup.label),
+                    label: Some(label),
                     bind_group_layouts: &layouts,
                     immediate_size: 0,
                 }),
-                needs_rest: lookup.needs_rest,
+                needs_rest,
             }
+        };
+        let lookups = lookups.iter().map(|lookup| {
+            stage(lookup.label, &forward_module(lookup), lookup.needs_rest, lookup.layout.as_ref())
         });
-        let lookups = lookups.collect();
         Pipelines {
             format,
             samples,
-            lookups,
+            lookups: lookups.collect(),
+            geometry: stage("geometry", &geometry_module(), false, None),
             made: BTreeMap::new(),
             points: points(device, &groups[0], format, samples),
             error: error(device, format, samples),
@@ -127,21 +151,23 @@ impl Pipelines {
     }
 
     fn make(&self, gpu: &Gpu, key: PipelineKey) -> wgpu::RenderPipeline {
-        let lookup = &self.lookups[key.lookup];
+        let (stage, format, samples) = match key.stage {
+            Stage::Picture(lookup) => (&self.lookups[lookup], self.format, self.samples),
+            Stage::Geometry => (&self.geometry, NORMAL_FORMAT, 1),
+        };
         let flag = |on: bool| f64::from(u8::from(on));
-        let rest = ("NEEDS_REST", flag(lookup.needs_rest));
-        let fragment_constants = [
-            rest,
-            ("CUTS_HOLES", flag(key.cuts_holes)),
-            ("BLENDS", flag(key.blends)),
-            ("INSPECTS", flag(key.inspects)),
-        ];
+        let rest = ("NEEDS_REST", flag(stage.needs_rest));
+        let mut fragment_constants = vec![("CUTS_HOLES", flag(key.cuts_holes))];
+        if let Stage::Picture(_) = key.stage {
+            let own = [rest, ("BLENDS", flag(key.blends)), ("INSPECTS", flag(key.inspects))];
+            fragment_constants.extend(own);
+        }
         let options = |constants| wgpu::PipelineCompilationOptions { constants, ..Default::default() };
         gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some("forward"),
-            layout: Some(&lookup.layout),
+            layout: Some(&stage.layout),
             vertex: wgpu::VertexState {
-                module: &lookup.module,
+                module: &stage.module,
                 entry_point: Some(if key.detailed { "vertex_detailed" } else { "vertex_plain" }),
                 compilation_options: options(&[rest]),
                 buffers: &vertex_layouts(key.detailed),
@@ -152,13 +178,13 @@ impl Pipelines {
                 ..Default::default()
             },
             depth_stencil: Some(depth(!key.blends)),
-            multisample: multisample(self.samples),
+            multisample: multisample(samples),
             fragment: Some(wgpu::FragmentState {
-                module: &lookup.module,
+                module: &stage.module,
                 entry_point: Some("fragment"),
                 compilation_options: options(&fragment_constants),
                 targets: &[Some(wgpu::ColorTargetState {
-                    format: self.format,
+                    format,
                     blend: key.blends.then_some(wgpu::BlendState::ALPHA_BLENDING),
                     write_mask: wgpu::ColorWrites::ALL,
                 })],

@@ -2,6 +2,7 @@
 
 use super::MipFilter;
 use crate::RenderError;
+use crate::obscurance::Obscurance;
 
 /// Most places that are looked at around a sample.
 pub const MAX_SAMPLES: u32 = 256;
@@ -55,6 +56,17 @@ impl SaoParams {
     /// How far what blocks must stand above the surface, metres.
     pub fn bias_m(&self) -> f32 {
         self.bias_m.unwrap_or(SaoParams::BIAS_OF_RADIUS * self.radius_m)
+    }
+
+    pub(crate) fn estimator(&self) -> Obscurance {
+        Obscurance {
+            sigma_m: self.sigma_m(),
+            bias_m: self.bias_m(),
+            beta: self.beta,
+            exponent: self.exponent,
+            samples: self.samples,
+            turns: self.turns,
+        }
     }
 
     /// Whether every parameter is in its range.

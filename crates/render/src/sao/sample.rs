@@ -14,14 +14,7 @@ const QUAD_EDGE_M: f32 = 0.02;
 /// Visibility by eq. 1 of each sample, row-major from the top, noisy: 0 … 1, and 1 for the background. The parameters must have passed
 /// [`SaoParams::check`], the pyramid be that of the picture.
 pub fn sample_obscurance(screen: &Screen, pyramid: &Pyramid, params: &SaoParams) -> Vec<f32> {
-    let estimator = Obscurance {
-        sigma_m: params.sigma_m(),
-        bias_m: params.bias_m(),
-        beta: params.beta,
-        exponent: params.exponent,
-        samples: params.samples,
-        turns: params.turns,
-    };
+    let estimator = params.estimator();
     let spiral = estimator.spiral();
     screen.map(|at| visibility_at(screen, pyramid, params, &estimator, &spiral, at))
 }

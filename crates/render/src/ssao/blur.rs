@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 /// Weights of a sample and of its neighbours at distance 1, 2, … on either side; all together sum to 1.
-fn weights(width: u32, sigma: f32) -> Vec<f32> {
+pub(super) fn weights(width: u32, sigma: f32) -> Vec<f32> {
     let sigma = f64::from(sigma);
     let bell = |distance: u32| {
         let x = f64::from(distance) / sigma;

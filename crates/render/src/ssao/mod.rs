@@ -86,6 +86,19 @@ pub fn estimate_visibility(screen: &Screen, params: &SsaoParams) -> Result<Vec<f
     Ok(visibility)
 }
 
+/// The places in the unit hemisphere about +z, and the 16 × 16 unit vectors that they are turned to, row by row.
+#[cfg(feature = "gpu")]
+pub(crate) fn pattern(params: &SsaoParams) -> (Vec<Vec3>, Vec<Vec3>) {
+    let pattern = Pattern::new(params.samples, params.seed);
+    (pattern.offsets, pattern.turns)
+}
+
+/// Weight of a sample itself in one direction of the blur.
+#[cfg(feature = "gpu")]
+pub(crate) fn middle_weight(params: &SsaoParams) -> f32 {
+    blur::weights(params.blur_width, params.blur_sigma)[0]
+}
+
 /// Part of the places around a sample that lie behind what the picture shows.
 fn occlusion_at(screen: &Screen, index: usize, offsets: &[Vec3], turn: Vec3, params: &SsaoParams) -> f32 {
     let normal = screen.normals_view()[index];

@@ -8,7 +8,7 @@ pub(super) const NOISE_SIDE: usize = 16;
 /// Places in the unit hemisphere about +z, and a tile of unit vectors in the plane z = 0 that they are turned to.
 pub(super) struct Pattern {
     pub(super) offsets: Vec<Vec3>,
-    turns: Vec<Vec3>,
+    pub(super) turns: Vec<Vec3>,
 }
 
 impl Pattern {

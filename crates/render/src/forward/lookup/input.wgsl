@@ -20,4 +20,7 @@ struct LookupInput {
     atlas: vec3<f32>,
     // From the old values (0) to the new ones (1).
     fade: f32,
+    // Centre of the pixel in the picture, and the distance along the view axis, metres.
+    pixel: vec2<f32>,
+    distance: f32,
 }

@@ -52,6 +52,8 @@ fn fragment(varyings: Varyings, @builtin(front_facing) is_front: bool) -> @locat
     input.instance = v.ids.x;
     input.atlas = v.atlas;
     input.fade = frame.fade;
+    input.pixel = floor(v.clip.xy) + 0.5;
+    input.distance = -dot(v.relative, frame.axis_world);
     if NEEDS_REST {
         input.position_rest = v.position_rest;
         // The world's orientation and the rest's are one, unless exactly one of the two maps mirrors.

@@ -6,7 +6,7 @@ struct Frame {
     eye_world: vec3<f32>,
     // One of the VIEW_ constants.
     view: u32,
-    // Unit, towards the viewer; of parallel cameras.
+    // Unit, from what is in the middle of the picture towards the viewer.
     axis_world: vec3<f32>,
     is_parallel: u32,
     ambient_sky: vec3<f32>,

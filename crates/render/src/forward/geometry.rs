@@ -1,0 +1,106 @@
+//! Depths and normals of a view, for methods that look at the picture alone.
+
+use dapple_gpu::{Gpu, wgpu};
+use dapple_scene::{Pose, PosedCamera};
+
+use super::draw::{FRAME_STRIDE, Wants, frame_group};
+use super::pipelines::{DEPTH_FORMAT, NORMAL_FORMAT, Stage};
+use super::view::{ViewCamera, frame_uniform};
+use super::{Forward, ForwardError, FrameInputs, GpuScene, LookupId, Transparency, View};
+use crate::gbuffer::check_scene;
+use crate::image::ToneMap;
+use crate::shade::ShadeParams;
+
+/// One view's textures, each `size` pixels large.
+#[derive(Clone, Copy, Debug)]
+pub struct GeometryTarget<'a> {
+    /// From where.
+    pub camera: PosedCamera,
+    /// Columns and rows.
+    pub size: (u32, u32),
+    /// Gets the unit normals of triangles in the world on the viewer's side, each component as (*n* + 1) / 2, and 1; zero where there is nothing.
+    /// [`GeometryTarget::NORMAL_FORMAT`].
+    pub normals: &'a wgpu::TextureView,
+    /// Gets depths, reversed: 0 is the background. [`GeometryTarget::DEPTH_FORMAT`].
+    pub depths: &'a wgpu::TextureView,
+}
+
+impl GeometryTarget<'_> {
+    /// Of the normals: ten bits a component, a tenth of a degree.
+    pub const NORMAL_FORMAT: wgpu::TextureFormat = NORMAL_FORMAT;
+    /// Of the depths.
+    pub const DEPTH_FORMAT: wgpu::TextureFormat = DEPTH_FORMAT;
+}
+
+impl Forward {
+    /// Records depths and normals of views, as [`crate::gbuffer::GBuffer::screen`] has them at one sample a pixel. Materials whose alpha is blended
+    /// are cut out at one half.
+    ///
+    /// # Errors
+    /// A pose of another scene, a camera that cannot project, or a size beyond the device's. Then nothing is recorded.
+    pub fn draw_geometry(
+        &mut self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        scene: &mut GpuScene,
+        pose: &Pose,
+        targets: &[GeometryTarget<'_>],
+    ) -> Result<(), ForwardError> {
+        check_scene(&scene.scene().clone(), pose)?;
+        let largest = gpu.device.limits().max_texture_dimension_2d;
+        let mut views = Vec::with_capacity(targets.len());
+        for (target, index) in targets.iter().zip(0..) {
+            if [target.size.0, target.size.1].iter().any(|side| !(1..=largest).contains(side)) {
+                let reason = "the picture has no pixels, or more than the device allows";
+                return Err(ForwardError::Frame { reason });
+            }
+            let view = View::new(target.camera, LookupId::NONE);
+            views.push((view, ViewCamera::new(&view, index, target.size)?));
+        }
+        scene.place(gpu, pose);
+        let shade = ShadeParams::default();
+        let inputs = FrameInputs {
+            pose,
+            shade: &shade,
+            tone_map: ToneMap::default(),
+            transparency: Transparency::Cutout,
+            fade: 1.0,
+            views: &[],
+        };
+        let mut bytes = vec![0u8; FRAME_STRIDE * views.len()];
+        for (slot, (view, camera)) in bytes.chunks_exact_mut(FRAME_STRIDE).zip(&views) {
+            let uniform = frame_uniform(&inputs, view, camera, 0);
+            slot[..size_of_val(&uniform)].copy_from_slice(bytemuck::bytes_of(&uniform));
+        }
+        self.geometry_frames.write(gpu, &bytes);
+        // Of small things one is made each time: shadow maps and this buffer come and go.
+        let group = frame_group(gpu, &self.frame_layout, &self.geometry_frames, &self.lights, &self.shadows);
+        for (target, (_, camera)) in targets.iter().zip(&views) {
+            let wants = Wants { stage: Stage::Geometry, blends: false, inspects: false };
+            let list = self.list(gpu, scene, camera, wants);
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("geometry"),
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: target.normals,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                        store: wgpu::StoreOp::Store,
+                    },
+                })],
+                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                    view: target.depths,
+                    depth_ops: Some(wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(0.0),
+                        store: wgpu::StoreOp::Store,
+                    }),
+                    stencil_ops: None,
+                }),
+                ..Default::default()
+            });
+            self.run(&mut pass, scene, &group, camera, &list);
+        }
+        Ok(())
+    }
+}

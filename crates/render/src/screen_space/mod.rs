@@ -1,0 +1,16 @@
+//! Methods that look at the picture alone, by one name each ([`ScreenMethod`]), and their passes on a graphics card
+//! ([`ScreenPasses`]). See `README.md`.
+
+mod method;
+#[cfg(feature = "gpu")]
+mod passes;
+#[cfg(feature = "gpu")]
+mod plan;
+#[cfg(all(test, feature = "gpu"))]
+mod tests;
+#[cfg(feature = "gpu")]
+mod uniforms;
+
+pub use method::ScreenMethod;
+#[cfg(feature = "gpu")]
+pub use passes::ScreenPasses;

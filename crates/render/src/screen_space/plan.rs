@@ -1,0 +1,305 @@
+//! Which passes a method has, one after the other.
+
+use dapple_gpu::{join, wgpu};
+
+use super::method::ScreenMethod;
+use super::uniforms::*;
+use crate::alchemy::AlchemyParams;
+use crate::bilateral::Bilateral;
+use crate::gtao::GtaoParams;
+use crate::hbao::{HbaoParams, Horizon};
+use crate::obscurance::Obscurance;
+use crate::sao::{MipFilter, SaoParams};
+use crate::ssao::SsaoParams;
+
+pub(super) const SCREEN_WGSL: &str = include_str!("wgsl/screen.wgsl");
+const NOISE_WGSL: &str = include_str!("wgsl/noise.wgsl");
+const OBSCURANCE_WGSL: &str = include_str!("../obscurance.wgsl");
+
+/// One fragment stage over the whole picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) enum Shader {
+    Distance,
+    Minify,
+    Ssao,
+    SsaoBlur,
+    Alchemy,
+    /// With the rotated grid, or another filter.
+    Sao {
+        rotated: bool,
+    },
+    Reconstruct,
+    Hbao,
+    Gtao,
+    Bilateral,
+    Place,
+}
+
+impl Shader {
+    #[cfg(test)]
+    pub(super) const ALL: [Shader; 11] = [
+        Shader::Distance,
+        Shader::Minify,
+        Shader::Ssao,
+        Shader::SsaoBlur,
+        Shader::Alchemy,
+        Shader::Sao { rotated: true },
+        Shader::Reconstruct,
+        Shader::Hbao,
+        Shader::Gtao,
+        Shader::Bilateral,
+        Shader::Place,
+    ];
+
+    /// For messages and timings.
+    pub(super) fn label(self) -> &'static str {
+        match self {
+            Shader::Distance => "distances",
+            Shader::Minify => "levels",
+            Shader::Ssao | Shader::Alchemy | Shader::Sao { .. } | Shader::Hbao | Shader::Gtao => "samples",
+            Shader::SsaoBlur | Shader::Bilateral | Shader::Reconstruct => "blur",
+            Shader::Place => "place",
+        }
+    }
+
+    /// The joined module and its fragment stage.
+    pub(super) fn module(self) -> (String, &'static str) {
+        let (files, entry): (&[&str], _) = match self {
+            Shader::Distance => (&[include_str!("wgsl/distance.wgsl")], "distance_fragment"),
+            Shader::Minify => (&[include_str!("../sao/minify.wgsl")], "minify_fragment"),
+            Shader::Ssao => (&[include_str!("../ssao/ssao.wgsl")], "ssao_fragment"),
+            Shader::SsaoBlur => (&[include_str!("../ssao/blur.wgsl")], "blur_fragment"),
+            Shader::Alchemy => {
+                (&[NOISE_WGSL, OBSCURANCE_WGSL, include_str!("../alchemy/alchemy.wgsl")], "alchemy_fragment")
+            }
+            Shader::Sao { .. } => {
+                (&[NOISE_WGSL, OBSCURANCE_WGSL, include_str!("../sao/sample.wgsl")], "sao_fragment")
+            }
+            Shader::Reconstruct => (&[include_str!("../sao/reconstruct.wgsl")], "reconstruct_fragment"),
+            Shader::Hbao => (&[NOISE_WGSL, include_str!("../hbao/hbao.wgsl")], "hbao_fragment"),
+            Shader::Gtao => (&[NOISE_WGSL, include_str!("../gtao/gtao.wgsl")], "gtao_fragment"),
+            Shader::Bilateral => (&[include_str!("wgsl/bilateral.wgsl")], "bilateral_fragment"),
+            Shader::Place => (&[include_str!("wgsl/place.wgsl")], "place_fragment"),
+        };
+        let files: Vec<&str> = [SCREEN_WGSL].into_iter().chain(files.iter().copied()).collect();
+        (join(&files), entry)
+    }
+
+    pub(super) fn constants(self) -> Vec<(&'static str, f64)> {
+        match self {
+            Shader::Sao { rotated } => vec![("USES_ROTATED_GRID", f64::from(u8::from(rotated)))],
+            _ => Vec::new(),
+        }
+    }
+}
+
+/// A texture that passes read and write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Image {
+    /// Depths of the geometry.
+    Depths,
+    /// A level of the distances.
+    Distances(u32),
+    /// One value a sample, in turns.
+    Value(usize),
+    /// Value and distance in bytes, in turns.
+    Packed(usize),
+    /// What the forward pass reads.
+    Picture,
+}
+
+impl Image {
+    pub(super) fn format(self) -> wgpu::TextureFormat {
+        match self {
+            Image::Depths => wgpu::TextureFormat::Depth32Float,
+            Image::Distances(_) => wgpu::TextureFormat::R32Float,
+            Image::Value(_) => wgpu::TextureFormat::R16Float,
+            Image::Packed(_) => wgpu::TextureFormat::Rgba8Unorm,
+            Image::Picture => wgpu::TextureFormat::Rg16Float,
+        }
+    }
+}
+
+/// One pass: what it reads beside distances and normals, what it writes, and its parameters' bytes.
+#[derive(Clone, Debug)]
+pub(super) struct Pass {
+    pub(super) shader: Shader,
+    pub(super) reads: Option<Image>,
+    pub(super) writes: Image,
+    pub(super) params: Vec<u8>,
+}
+
+fn pass<P: bytemuck::Pod>(shader: Shader, reads: Option<Image>, writes: Image, params: P) -> Pass {
+    Pass { shader, reads, writes, params: bytemuck::bytes_of(&params).to_vec() }
+}
+
+/// How many columns and rows a level of the pyramid has.
+pub(super) fn level_size((columns, rows): (u32, u32), level: u32) -> (u32, u32) {
+    (columns.div_ceil(1 << level), rows.div_ceil(1 << level))
+}
+
+/// Levels above the first that a method reads from a picture of this size: fewer where one has a single texel.
+pub(super) fn levels(method: &ScreenMethod, size: (u32, u32)) -> u32 {
+    let ScreenMethod::Sao(params) = method else { return 0 };
+    let longest = size.0.max(size.1).max(1);
+    params.levels.min(longest.next_power_of_two().ilog2())
+}
+
+/// All passes of a method over a picture of this size, the guard band included, whose samples on each side are `guard`.
+pub(super) fn passes(method: &ScreenMethod, size: (u32, u32), guard: u32) -> Vec<Pass> {
+    let mut all = vec![pass(Shader::Distance, Some(Image::Depths), Image::Distances(0), [0.0f32; 4])];
+    let last = match method {
+        ScreenMethod::Ssao(params) => ssao(params, &mut all),
+        ScreenMethod::Alchemy(params) => alchemy(params, &mut all),
+        ScreenMethod::Sao(params) => sao(params, size, levels(method, size), &mut all),
+        ScreenMethod::Hbao(params) => hbao(params, &mut all),
+        ScreenMethod::Gtao(params) => gtao(params, &mut all),
+    };
+    let params = PlaceUniform { guard: [guard as i32; 2], pad: [0.0; 2] };
+    all.push(pass(Shader::Place, Some(last), Image::Picture, params));
+    all
+}
+
+const AXES: [[i32; 2]; 2] = [[1, 0], [0, 1]];
+
+fn ssao(params: &SsaoParams, all: &mut Vec<Pass>) -> Image {
+    let (offsets, turns) = crate::ssao::pattern(params);
+    let mut uniform = SsaoUniform {
+        radius_m: params.radius_m,
+        samples: params.samples,
+        height_m: params.bias * params.radius_m,
+        pad: 0.0,
+        offsets: [[0.0; 4]; 256],
+        turns: [[0.0; 4]; 128],
+    };
+    for (out, offset) in uniform.offsets.iter_mut().zip(offsets) {
+        *out = offset.extend(0.0).to_array();
+    }
+    for (out, pair) in uniform.turns.iter_mut().zip(turns.chunks_exact(2)) {
+        *out = [pair[0].x, pair[0].y, pair[1].x, pair[1].y];
+    }
+    all.push(pass(Shader::Ssao, None, Image::Value(0), uniform));
+    let middle = crate::ssao::middle_weight(params);
+    for (which, axis) in AXES.into_iter().enumerate() {
+        let blur = BlurUniform {
+            axis,
+            half_width: params.blur_width / 2,
+            inverse_sigma: 1.0 / params.blur_sigma,
+            middle,
+            pad_a: 0.0,
+            pad_b: [0.0; 2],
+        };
+        all.push(pass(Shader::SsaoBlur, Some(Image::Value(which)), Image::Value(1 - which), blur));
+    }
+    Image::Value(0)
+}
+
+fn obscurance(radius_m: f32, estimator: &Obscurance) -> ObscuranceUniform {
+    ObscuranceUniform {
+        radius_m,
+        sigma_m: estimator.sigma_m,
+        bias_m: estimator.bias_m,
+        beta: estimator.beta,
+        exponent: estimator.exponent,
+        samples: estimator.samples,
+        turns: estimator.turns,
+        switch_log2: 0,
+        top_level: 0,
+        farthest_m: 0.0,
+        pad: [0.0; 2],
+    }
+}
+
+fn alchemy(params: &AlchemyParams, all: &mut Vec<Pass>) -> Image {
+    let uniform = obscurance(params.radius_m, &params.estimator());
+    all.push(pass(Shader::Alchemy, None, Image::Value(0), uniform));
+    bilateral(params.radius_m, params.blur_taps, all)
+}
+
+fn sao(params: &SaoParams, size: (u32, u32), levels: u32, all: &mut Vec<Pass>) -> Image {
+    for level in 1..=levels {
+        let below = level_size(size, level - 1);
+        let uniform = MinifyUniform {
+            size: [below.0, below.1],
+            filtering: match params.filter {
+                MipFilter::RotatedGrid => 0,
+                MipFilter::Mean => 1,
+                MipFilter::HarmonicMean => 2,
+                MipFilter::Farthest => 3,
+                MipFilter::Nearest => 4,
+            },
+            pad: 0,
+        };
+        let (reads, writes) = (Image::Distances(level - 1), Image::Distances(level));
+        all.push(pass(Shader::Minify, Some(reads), writes, uniform));
+    }
+    let uniform = ObscuranceUniform {
+        switch_log2: params.switch_log2,
+        top_level: levels,
+        farthest_m: params.farthest_m,
+        ..obscurance(params.radius_m, &params.estimator())
+    };
+    let shader = Shader::Sao { rotated: params.filter == MipFilter::RotatedGrid };
+    all.push(pass(shader, None, Image::Packed(0), uniform));
+    for (axis, writes) in AXES.into_iter().zip([Image::Packed(1), Image::Value(0)]) {
+        let uniform = ReconstructUniform {
+            axis,
+            taps: params.blur_taps,
+            stride: params.blur_stride,
+            sharpness: params.sharpness,
+            pad_a: 0.0,
+            pad_b: [0.0; 2],
+        };
+        let reads = if axis == AXES[0] { Image::Packed(0) } else { Image::Packed(1) };
+        all.push(pass(Shader::Reconstruct, Some(reads), writes, uniform));
+    }
+    Image::Value(0)
+}
+
+fn hbao(params: &HbaoParams, all: &mut Vec<Pass>) -> Image {
+    let uniform = HbaoUniform {
+        radius_m: params.radius_m,
+        directions: params.directions,
+        steps: params.steps,
+        bias: params.bias_degrees.to_radians(),
+        strength: params.strength,
+        is_mean: u32::from(params.horizon == Horizon::Mean),
+        pad: [0.0; 2],
+    };
+    all.push(pass(Shader::Hbao, None, Image::Value(0), uniform));
+    bilateral(params.radius_m, params.blur_taps, all)
+}
+
+fn gtao(params: &GtaoParams, all: &mut Vec<Pass>) -> Image {
+    let uniform = GtaoUniform {
+        radius_m: params.radius_m,
+        slices: params.slices,
+        steps: params.steps,
+        thickness_m: params.thickness_of_radius * params.radius_m,
+        bias: params.bias,
+        pad_a: 0.0,
+        pad_b: [0.0; 2],
+    };
+    all.push(pass(Shader::Gtao, None, Image::Value(0), uniform));
+    bilateral(params.radius_m, params.blur_taps, all)
+}
+
+/// Smooths the first value through the second.
+fn bilateral(radius_m: f32, taps: u32, all: &mut Vec<Pass>) -> Image {
+    let blur = Bilateral::within(radius_m, taps);
+    if taps == 0 {
+        return Image::Value(0);
+    }
+    for (which, axis) in AXES.into_iter().enumerate() {
+        let uniform = BilateralUniform {
+            axis,
+            taps: blur.taps,
+            stride: blur.stride,
+            tolerance_m: blur.tolerance_m,
+            inverse_sigma: 1.0 / blur.sigma_taps() as f32,
+            pad: [0.0; 2],
+        };
+        all.push(pass(Shader::Bilateral, Some(Image::Value(which)), Image::Value(1 - which), uniform));
+    }
+    Image::Value(0)
+}

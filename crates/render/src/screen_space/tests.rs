@@ -1,0 +1,193 @@
+//! Shaders without a device, and pictures of the card beside the twins'.
+
+use std::mem::offset_of;
+use std::sync::Arc;
+
+use dapple_gpu::testing::{
+    block_on, check_struct, gpu_for_tests, naga::ShaderStage, translate_to_webgl2, validate,
+};
+use dapple_gpu::{Gpu, read_texture, wgpu};
+use dapple_scene::{Pose, PosedCamera, Projection};
+use glam::Vec3;
+
+use super::plan::Shader;
+use super::uniforms::*;
+use super::{ScreenMethod, ScreenPasses};
+use crate::forward::{Forward, GpuScene, GpuSceneOptions, LookupId};
+use crate::sao::{MipFilter, SaoParams};
+use crate::testing::Stage;
+use crate::testing::screen::{draw, look, still_life};
+
+#[test]
+fn every_pass_is_valid_and_within_webgl2() {
+    for shader in Shader::ALL {
+        let (wgsl, entry) = shader.module();
+        let module = validate(&wgsl).unwrap_or_else(|e| panic!("{shader:?}: {e}"));
+        for (stage, entry) in [(ShaderStage::Vertex, "screen_vertex"), (ShaderStage::Fragment, entry)] {
+            translate_to_webgl2(&module, stage, entry).unwrap_or_else(|e| panic!("{shader:?}: {e}"));
+        }
+    }
+}
+
+/// Name and offset of fields.
+macro_rules! members {
+    ($ty:ty: $($field:ident)*) => {
+        [$((stringify!($field), offset_of!($ty, $field))),*]
+    };
+}
+
+#[test]
+fn uniforms_are_laid_out_as_in_the_shaders() {
+    let check = |shader: Shader, name, size, members: &[(&str, usize)]| {
+        let module = validate(&shader.module().0).unwrap();
+        check_struct(&module, name, size, members).unwrap();
+    };
+    let members = members!(ScreenUniform: view_from_world_x view_from_world_y view_from_world_z half_extent size
+        is_parallel align depth samples_per_metre pad pad_b);
+    check(Shader::Distance, "Screen", size_of::<ScreenUniform>(), &members);
+    let members = members!(BilateralUniform: axis taps stride tolerance_m inverse_sigma pad);
+    check(Shader::Bilateral, "BilateralParams", size_of::<BilateralUniform>(), &members);
+    let members = members!(ObscuranceUniform: radius_m sigma_m bias_m beta exponent samples turns switch_log2
+        top_level farthest_m pad);
+    check(Shader::Alchemy, "ObscuranceParams", size_of::<ObscuranceUniform>(), &members);
+    let members = members!(MinifyUniform: size filtering pad);
+    check(Shader::Minify, "MinifyParams", size_of::<MinifyUniform>(), &members);
+    let members = members!(ReconstructUniform: axis taps stride sharpness pad_a pad_b);
+    check(Shader::Reconstruct, "ReconstructParams", size_of::<ReconstructUniform>(), &members);
+    let members = members!(HbaoUniform: radius_m directions steps bias strength is_mean pad);
+    check(Shader::Hbao, "HbaoParams", size_of::<HbaoUniform>(), &members);
+    let members = members!(GtaoUniform: radius_m slices steps thickness_m bias pad_a pad_b);
+    check(Shader::Gtao, "GtaoParams", size_of::<GtaoUniform>(), &members);
+    let members = members!(SsaoUniform: radius_m samples height_m pad offsets turns);
+    check(Shader::Ssao, "SsaoParams", size_of::<SsaoUniform>(), &members);
+    let members = members!(BlurUniform: axis half_width inverse_sigma middle pad_a pad_b);
+    check(Shader::SsaoBlur, "BlurParams", size_of::<BlurUniform>(), &members);
+    let members = members!(PlaceUniform: guard pad);
+    check(Shader::Place, "PlaceParams", size_of::<PlaceUniform>(), &members);
+}
+
+struct Bench {
+    gpu: Gpu,
+    pose: Pose,
+    scene: GpuScene,
+    forward: Forward,
+    passes: ScreenPasses,
+}
+
+impl Bench {
+    fn new(stage: &Stage) -> Option<Bench> {
+        let gpu = gpu_for_tests()?;
+        let gpu_scene =
+            GpuScene::new(&gpu, Arc::new(stage.scene.clone()), &GpuSceneOptions { mips: false }).unwrap();
+        let lookups = [ScreenPasses::lookup(&gpu)];
+        let forward = Forward::new(&gpu, wgpu::TextureFormat::Rgba8Unorm, 1, &lookups).unwrap();
+        let passes = ScreenPasses::new(&gpu, LookupId::added(0)).unwrap();
+        Some(Bench { gpu, pose: stage.pose.clone(), scene: gpu_scene, forward, passes })
+    }
+
+    /// Visibility and distance of each pixel.
+    fn run(
+        &mut self,
+        camera: &PosedCamera,
+        size: (u32, u32),
+        method: &ScreenMethod,
+        guard: u32,
+    ) -> Vec<[f32; 2]> {
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let Bench { gpu, pose, scene, forward, passes } = self;
+        passes.draw(gpu, &mut encoder, forward, scene, pose, camera, size, method, guard).unwrap();
+        gpu.queue.submit([encoder.finish()]);
+        let bytes = block_on(read_texture(gpu, passes.picture().unwrap(), 0)).unwrap();
+        let half = |bytes: &[u8]| half_to_f32(u16::from_le_bytes([bytes[0], bytes[1]]));
+        bytes.chunks_exact(4).map(|texel| [half(&texel[..2]), half(&texel[2..])]).collect()
+    }
+}
+
+fn half_to_f32(bits: u16) -> f32 {
+    let (sign, exponent, mantissa) = (bits >> 15, (bits >> 10) & 31, f32::from(bits & 1023));
+    let value = match exponent {
+        0 => mantissa * 2f32.powi(-24),
+        31 => f32::INFINITY,
+        e => (1.0 + mantissa / 1024.0) * 2f32.powi(i32::from(e) - 15),
+    };
+    if sign == 1 { -value } else { value }
+}
+
+fn cameras() -> [PosedCamera; 2] {
+    [
+        Projection::Perspective { yfov: 0.8, near: 0.02 },
+        Projection::Orthographic { half_height: 2.0, near: -3.0, far: 20.0 },
+    ]
+    .map(|projection| PosedCamera { projection, ..look(Vec3::new(1.5, 2.0, 3.0), Vec3::ZERO) })
+}
+
+/// All methods, and what their defaults leave out.
+fn methods() -> Vec<ScreenMethod> {
+    let filters = MipFilter::ALL.map(|filter| {
+        ScreenMethod::Sao(SaoParams {
+            filter,
+            radius_m: 2.0,
+            levels: 9,
+            switch_log2: 1,
+            ..SaoParams::default()
+        })
+    });
+    ScreenMethod::all().into_iter().chain(filters).collect()
+}
+
+#[test]
+fn card_and_twin_agree() {
+    let scene = still_life();
+    let Some(mut bench) = Bench::new(&scene) else { return };
+    for camera in cameras() {
+        for size in [[160, 120], [61, 37]] {
+            let (_, screen) = draw(&scene, &camera, size);
+            for method in methods() {
+                let twin = method.estimate_visibility(&screen).unwrap();
+                let card = bench.run(&camera, (size[0], size[1]), &method, 0);
+                let (mut seen, mut within, mut sum) = (0, 0, 0.0);
+                for ((twin, card), distance) in twin.iter().zip(&card).zip(screen.distances_m()) {
+                    // An edge may fall to the other side.
+                    if distance.is_finite() != (card[1] < 59_000.0) {
+                        continue;
+                    }
+                    let off = f64::from((twin - card[0]).abs());
+                    seen += 1;
+                    within += usize::from(off <= 3.0 / 255.0);
+                    sum += off;
+                    if !distance.is_finite() {
+                        assert_eq!(card[0], 1.0, "{method:?}: the background is open");
+                    }
+                }
+                let (part, mean) = (within as f64 / f64::from(seen), sum / f64::from(seen));
+                eprintln!(
+                    "{} {size:?} {:?}: {part:.4} within, mean {mean:.5}",
+                    method.name(),
+                    camera.projection
+                );
+                assert!(seen > size[0] * size[1] * 99 / 100, "{method:?}: {seen}");
+                assert!(part > 0.995 && mean < 0.001, "{method:?} {size:?}: {part}, {mean}");
+            }
+        }
+    }
+}
+
+#[test]
+fn tiny_pictures_and_guard_bands_are_drawn() {
+    let scene = still_life();
+    let Some(mut bench) = Bench::new(&scene) else { return };
+    for camera in cameras() {
+        for method in methods() {
+            for size in [(1, 1), (2, 1), (1, 3), (5, 7)] {
+                for guard in [0, 1, 5] {
+                    let card = bench.run(&camera, size, &method, guard);
+                    assert_eq!(card.len() as u32, size.0 * size.1);
+                    assert!(
+                        card.iter().all(|[v, _]| (0.0..=1.0).contains(v)),
+                        "{method:?} {size:?}: {card:?}"
+                    );
+                }
+            }
+        }
+    }
+}

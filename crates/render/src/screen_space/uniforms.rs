@@ -1,0 +1,158 @@
+//! Rust mirrors of the structures in the shaders. A test compares every offset.
+
+use bytemuck::{Pod, Zeroable};
+use dapple_scene::{PosedCamera, Projection};
+use glam::Mat3;
+
+/// `Screen` in `screen.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct ScreenUniform {
+    pub(super) view_from_world_x: [f32; 4],
+    pub(super) view_from_world_y: [f32; 4],
+    pub(super) view_from_world_z: [f32; 4],
+    pub(super) half_extent: [f32; 2],
+    pub(super) size: [u32; 2],
+    pub(super) is_parallel: u32,
+    pub(super) align: u32,
+    pub(super) depth: [f32; 2],
+    pub(super) samples_per_metre: f32,
+    pub(super) pad: f32,
+    pub(super) pad_b: [f32; 2],
+}
+
+impl ScreenUniform {
+    /// Of a camera's picture with so many columns and rows.
+    pub(super) fn new(camera: &PosedCamera, size: (u32, u32)) -> ScreenUniform {
+        let (half_height, is_parallel, depth) = match camera.projection {
+            Projection::Perspective { yfov, near } => (libm::tan(0.5 * f64::from(yfov)), false, [near, 0.0]),
+            Projection::Orthographic { half_height, near, far } => {
+                (f64::from(half_height), true, [far, far - near])
+            }
+        };
+        let aspect = f64::from(size.0) / f64::from(size.1);
+        let [x, y, z] =
+            Mat3::from(camera.world_from_view.matrix3).to_cols_array_2d().map(|[x, y, z]| [x, y, z, 0.0]);
+        ScreenUniform {
+            view_from_world_x: x,
+            view_from_world_y: y,
+            view_from_world_z: z,
+            half_extent: [(half_height * aspect) as f32, half_height as f32],
+            size: [size.0, size.1],
+            is_parallel: u32::from(is_parallel),
+            align: 0,
+            depth,
+            samples_per_metre: 0.5 * size.1 as f32 / half_height as f32,
+            pad: 0.0,
+            pad_b: [0.0; 2],
+        }
+    }
+}
+
+/// `BilateralParams` in `bilateral.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct BilateralUniform {
+    pub(super) axis: [i32; 2],
+    pub(super) taps: u32,
+    pub(super) stride: u32,
+    pub(super) tolerance_m: f32,
+    pub(super) inverse_sigma: f32,
+    pub(super) pad: [f32; 2],
+}
+
+/// `ObscuranceParams` in `obscurance.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct ObscuranceUniform {
+    pub(super) radius_m: f32,
+    pub(super) sigma_m: f32,
+    pub(super) bias_m: f32,
+    pub(super) beta: f32,
+    pub(super) exponent: f32,
+    pub(super) samples: u32,
+    pub(super) turns: u32,
+    pub(super) switch_log2: u32,
+    pub(super) top_level: u32,
+    pub(super) farthest_m: f32,
+    pub(super) pad: [f32; 2],
+}
+
+/// `MinifyParams` in `minify.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct MinifyUniform {
+    pub(super) size: [u32; 2],
+    pub(super) filtering: u32,
+    pub(super) pad: u32,
+}
+
+/// `ReconstructParams` in `reconstruct.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct ReconstructUniform {
+    pub(super) axis: [i32; 2],
+    pub(super) taps: u32,
+    pub(super) stride: u32,
+    pub(super) sharpness: f32,
+    pub(super) pad_a: f32,
+    pub(super) pad_b: [f32; 2],
+}
+
+/// `HbaoParams` in `hbao.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct HbaoUniform {
+    pub(super) radius_m: f32,
+    pub(super) directions: u32,
+    pub(super) steps: u32,
+    pub(super) bias: f32,
+    pub(super) strength: f32,
+    pub(super) is_mean: u32,
+    pub(super) pad: [f32; 2],
+}
+
+/// `GtaoParams` in `gtao.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct GtaoUniform {
+    pub(super) radius_m: f32,
+    pub(super) slices: u32,
+    pub(super) steps: u32,
+    pub(super) thickness_m: f32,
+    pub(super) bias: f32,
+    pub(super) pad_a: f32,
+    pub(super) pad_b: [f32; 2],
+}
+
+/// `SsaoParams` in `ssao.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct SsaoUniform {
+    pub(super) radius_m: f32,
+    pub(super) samples: u32,
+    pub(super) height_m: f32,
+    pub(super) pad: f32,
+    pub(super) offsets: [[f32; 4]; 256],
+    pub(super) turns: [[f32; 4]; 128],
+}
+
+/// `BlurParams` in `blur.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct BlurUniform {
+    pub(super) axis: [i32; 2],
+    pub(super) half_width: u32,
+    pub(super) inverse_sigma: f32,
+    pub(super) middle: f32,
+    pub(super) pad_a: f32,
+    pub(super) pad_b: [f32; 2],
+}
+
+/// `PlaceParams` in `place.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct PlaceUniform {
+    pub(super) guard: [i32; 2],
+    pub(super) pad: [f32; 2],
+}

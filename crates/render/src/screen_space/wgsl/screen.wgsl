@@ -1,0 +1,118 @@
+// What every pass of a screen-space method sees: distances and normals of a picture, and the lens. The twin is `gbuffer::screen`.
+
+struct Screen {
+    // Rows of the rotation from the world to view space; w is not used.
+    view_from_world_x: vec4<f32>,
+    view_from_world_y: vec4<f32>,
+    view_from_world_z: vec4<f32>,
+    // Half the picture's width and height: at distance 1 for a perspective, anywhere for a parallel camera.
+    half_extent: vec2<f32>,
+    // Columns and rows.
+    size: vec2<u32>,
+    is_parallel: u32,
+    align: u32,
+    // Perspective: the near plane and 0. Parallel: the far plane, and how far it is behind the near one.
+    depth: vec2<f32>,
+    // Samples of the picture in a metre across the view axis: at distance 1 (perspective) or anywhere (parallel).
+    samples_per_metre: f32,
+    pad: f32,
+    pad_b: vec2<f32>,
+}
+
+@group(0) @binding(0) var<uniform> screen: Screen;
+// Metres along the view axis, and ever coarser ones above. The background is at BACKGROUND_M.
+@group(0) @binding(1) var distances: texture_2d<f32>;
+// Unit normals in the world as (n + 1) / 2, and 1; 0 where there is nothing.
+@group(0) @binding(2) var normals: texture_2d<f32>;
+// What the pass before has written, where a pass needs that.
+@group(1) @binding(1) var before: texture_2d<f32>;
+
+// What infinity is: shaders may not have it.
+const BACKGROUND_M: f32 = 1e30;
+const TAU: f32 = 6.2831853;
+const PI: f32 = 3.1415927;
+
+// Covers the picture.
+@vertex
+fn screen_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
+    let corner = vec2(f32((index << 1u) & 2u), f32(index & 2u));
+    return vec4(corner * 2.0 - 1.0, 0.0, 1.0);
+}
+
+fn is_background(distance: f32) -> bool {
+    return distance > 0.5 * BACKGROUND_M;
+}
+
+fn is_inside(at: vec2<i32>) -> bool {
+    return all(at >= vec2(0)) && all(at < vec2<i32>(screen.size));
+}
+
+// The place at a distance that a point of the picture shows; the first sample's centre is at (0.5, 0.5).
+fn place_view(point: vec2<f32>, distance: f32) -> vec3<f32> {
+    let across = vec2(2.0, -2.0) * point / vec2<f32>(screen.size) + vec2(-1.0, 1.0);
+    let scale = select(distance, 1.0, screen.is_parallel != 0u);
+    return vec3(across * screen.half_extent * scale, -distance);
+}
+
+// The place that a sample sees, and 1; 0 for the background and outside of the picture.
+fn place_at(at: vec2<i32>) -> vec4<f32> {
+    if !is_inside(at) {
+        return vec4(0.0);
+    }
+    let distance = textureLoad(distances, at, 0).r;
+    if is_background(distance) {
+        return vec4(0.0);
+    }
+    return vec4(place_view(vec2<f32>(at) + 0.5, distance), 1.0);
+}
+
+// A sample's unit normal in view space; zero where it has none.
+fn normal_at(at: vec2<i32>) -> vec3<f32> {
+    let texel = textureLoad(normals, at, 0);
+    if texel.a < 0.5 {
+        return vec3(0.0);
+    }
+    let n = texel.xyz * 2.0 - 1.0;
+    let x = dot(screen.view_from_world_x.xyz, n);
+    let y = dot(screen.view_from_world_y.xyz, n);
+    let z = dot(screen.view_from_world_z.xyz, n);
+    return normalize(vec3(x, y, z));
+}
+
+// The sample that lies so many to the right and down of another's centre.
+fn neighbour(at: vec2<i32>, by: vec2<f32>) -> vec2<i32> {
+    // Far outside no integer would hold it.
+    let reach = vec2<f32>(screen.size) + 2.0;
+    return vec2<i32>(floor(clamp(vec2<f32>(at) + 0.5 + by, -reach, 2.0 * reach)));
+}
+
+fn samples_per_metre(distance: f32) -> f32 {
+    return select(screen.samples_per_metre / distance, screen.samples_per_metre, screen.is_parallel != 0u);
+}
+
+// The way from a place to the eye, a unit vector.
+fn towards_eye(place: vec3<f32>) -> vec3<f32> {
+    if screen.is_parallel != 0u {
+        return vec3(0.0, 0.0, 1.0);
+    }
+    return -place / max(length(place), 1e-12);
+}
+
+// Where what a point of the picture shows meets a plane, and 1; 0 if it does not, or behind the camera.
+fn on_plane(point: vec2<f32>, place: vec3<f32>, normal: vec3<f32>) -> vec4<f32> {
+    var origin = vec3(0.0);
+    var ray = place_view(point, 1.0);
+    if screen.is_parallel != 0u {
+        origin = place_view(point, 0.0);
+        ray = vec3(0.0, 0.0, -1.0);
+    }
+    let steepness = dot(normal, ray);
+    if abs(steepness) < 1e-12 {
+        return vec4(0.0);
+    }
+    let along = dot(normal, place - origin) / steepness;
+    if along <= 0.0 && screen.is_parallel == 0u {
+        return vec4(0.0);
+    }
+    return vec4(origin + ray * along, 1.0);
+}
