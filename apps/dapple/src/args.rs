@@ -24,7 +24,7 @@ pub(crate) use bit_rate::BitRate;
 pub(crate) use eval::{EvalArgs, Options, ScenesArgs};
 pub(crate) use serve::{LogFormat, Named, ServeArgs};
 pub(crate) use verbs::{CompareArgs, DiffArgs, ErrorMap, EvalVerb, JudgeArgs, PictureFormat, ReferenceArgs};
-pub(crate) use view::{Preset, ViewArgs, ViewKind};
+pub(crate) use view::{Preset, ViewArgs, ViewKind, ViewMethod};
 pub(crate) use watch::{DemoArgs, InspectArgs, LightArgs, RecordArgs};
 pub(crate) use worker::WorkerArgs;
 

@@ -22,6 +22,9 @@ pub(crate) struct ViewerJson {
     /// Where the same session is over MoQ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) moq: Option<MoqJson>,
+    /// How far away what blocks may be, metres: of its light, and so of methods that look at the picture alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) radius: Option<f32>,
     /// The animation that plays, if that is not the file's first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) animation: Option<u32>,

@@ -1,7 +1,9 @@
 // Types and documentation of dapple.js.
 
 /** How visibility is found: points through the atlas, points by the paper's look-up, or not at all. */
-export type Method = "psao" | "psao-paper" | "none";
+/** Methods that look at the picture alone: they need no server, no stream and no points. */
+export type ScreenMethod = "ssao" | "alchemy" | "sao" | "hbao" | "hbao-plus" | "gtao";
+export type Method = "psao" | "psao-paper" | ScreenMethod | "none";
 
 /** What is shown. */
 export type View = "beauty" | "visibility" | "normal" | "points" | "texels" | "weights" | "age" | "error";
@@ -158,6 +160,12 @@ export interface Options {
   backend?: "auto" | "webgpu" | "webgl2";
   /** Default `psao`. */
   method?: Method;
+  /** What stands in for points while there are none: before the first light, or where none ever comes. Default `none`: everything is open. */
+  fallback?: ScreenMethod | "none";
+  /** Of methods that look at the picture alone: how far away what blocks may be, metres. Default 0.6. */
+  radius?: number;
+  /** Of the same: how far beyond the picture they look, as a part of its height, 0 to 0.5. Default 0.1. */
+  guardBand?: number;
   /** Default `beauty`. */
   view?: View;
   /** Another method right of a part (0 to 1) of the width. Default none. */

@@ -94,7 +94,10 @@ class Viewer {
 
   #apply() {
     const { method, view, split, camera, time, loop = true, paused = false, fade, live } = this.#options;
+    const { fallback, radius = NaN, guardBand = NaN } = this.#options;
     if (method) this.setMethod(method);
+    if (fallback) this.#core.setFallback(fallback);
+    this.#core.setScreenSpace(radius, guardBand);
     if (view) this.setView(view);
     if (split) this.setSplit(split.position, split.method);
     if (camera) this.setCamera(camera);

@@ -15,9 +15,9 @@ const STAGES = {
   stream: "Fetching the light",
   light: "Laying out the light",
 };
-const NUMBERS = ["time", "shadowResolution", "samples", "fade", "maxPixelRatio", "animation"];
+const NUMBERS = ["time", "shadowResolution", "samples", "fade", "radius", "guardBand", "maxPixelRatio", "animation"];
 const FLAGS = ["paused", "loop"];
-const WORDS = ["scene", "stream", "live", "token", "transport", "backend", "method", "view", "camera"];
+const WORDS = ["scene", "stream", "live", "token", "transport", "backend", "method", "fallback", "view", "camera"];
 
 const session = new SessionPanel();
 let viewer = null;

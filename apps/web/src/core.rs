@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use dapple_client::clock::Clock;
 use dapple_client::rate::Rate;
-use dapple_client::viewer::{DebugView, DrawOptions, LoadProgress, Viewer, ViewerConfig};
+use dapple_client::viewer::{DebugView, DrawOptions, LoadProgress, ScreenOptions, Viewer, ViewerConfig};
 use dapple_render::shade::ShadeParams;
 use dapple_scene::{NoFiles, Scene, Spare};
 use dapple_stream::{Limits, Recording, Replay};
@@ -240,6 +240,27 @@ impl Core {
         self.options.method = names::method(name)?;
         self.changed = true;
         Ok(())
+    }
+
+    /// What stands in for points while there are none, by name.
+    #[wasm_bindgen(js_name = setFallback)]
+    pub fn set_fallback(&mut self, name: &str) -> Result<(), JsError> {
+        self.options.fallback = names::fallback(name)?;
+        self.changed = true;
+        Ok(())
+    }
+
+    /// Of methods that look at the picture alone: how far away what blocks may be, metres, and how far beyond the picture is looked, as a part
+    /// of its height.
+    #[wasm_bindgen(js_name = setScreenSpace)]
+    pub fn set_screen_space(&mut self, radius_m: f32, guard_band: f32) {
+        let usual = ScreenOptions::default();
+        let positive = radius_m.is_finite() && radius_m > 0.0;
+        self.options.screen = ScreenOptions {
+            radius_m: if positive { radius_m } else { usual.radius_m },
+            guard_band: if guard_band.is_finite() { guard_band.clamp(0.0, 0.5) } else { usual.guard_band },
+        };
+        self.changed = true;
     }
 
     /// What is shown, by name.

@@ -1,6 +1,7 @@
 //! What JavaScript calls the choices.
 
 use dapple_client::viewer::{DebugView, Method};
+use dapple_render::screen_space::ScreenKind;
 
 /// Which of a browser's two interfaces to graphics cards draws.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,8 +37,21 @@ impl std::error::Error for UnknownName {}
 const BACKENDS: [(&str, Backend); 3] =
     [("auto", Backend::Auto), ("webgpu", Backend::WebGpu), ("webgl2", Backend::WebGl2)];
 
-const METHODS: [(&str, Method); 3] =
-    [("psao", Method::Psao), ("psao-paper", Method::PsaoPaper), ("none", Method::None)];
+const METHODS: [(&str, Method); 9] = [
+    ("psao", Method::Psao),
+    ("psao-paper", Method::PsaoPaper),
+    screen(ScreenKind::Ssao),
+    screen(ScreenKind::Alchemy),
+    screen(ScreenKind::Sao),
+    screen(ScreenKind::Hbao),
+    screen(ScreenKind::HbaoPlus),
+    screen(ScreenKind::Gtao),
+    ("none", Method::None),
+];
+
+const fn screen(kind: ScreenKind) -> (&'static str, Method) {
+    (kind.name(), Method::Screen(kind))
+}
 
 const VIEWS: [(&str, DebugView); 8] = [
     ("beauty", DebugView::Beauty),
@@ -55,9 +69,22 @@ pub fn backend(name: &str) -> Result<Backend, UnknownName> {
     find(&BACKENDS, "backend", name)
 }
 
-/// The method of that name: `psao`, `psao-paper`, `none`.
+/// The method of that name: `psao`, `psao-paper`, `ssao`, `alchemy`, `sao`, `hbao`, `hbao-plus`, `gtao`, `none`.
 pub fn method(name: &str) -> Result<Method, UnknownName> {
     find(&METHODS, "method", name)
+}
+
+/// What stands in for points, by the name of a method of screen space; `none` for nothing.
+pub fn fallback(name: &str) -> Result<Option<ScreenKind>, UnknownName> {
+    match METHODS.iter().find(|(known, _)| *known == name) {
+        Some((_, Method::Screen(kind))) => Ok(Some(*kind)),
+        Some((_, Method::None)) => Ok(None),
+        _ => {
+            let names = ScreenKind::ALL.map(ScreenKind::name);
+            let known = names.into_iter().chain(["none"]).collect::<Vec<_>>().join(", ");
+            Err(UnknownName { what: "fallback", found: name.to_owned(), known })
+        }
+    }
 }
 
 /// The view of that name: `beauty`, `visibility`, `normal`, `points`, `texels`, `weights`, `age`, `error`.
@@ -83,7 +110,15 @@ mod tests {
     fn names_stand_for_choices() {
         assert_eq!(backend("webgl2"), Ok(Backend::WebGl2));
         assert_eq!(method("none"), Ok(Method::None));
+        assert_eq!(method("hbao-plus"), Ok(Method::Screen(ScreenKind::HbaoPlus)));
         assert_eq!(view("age"), Ok(DebugView::Age));
+        assert_eq!(fallback("sao"), Ok(Some(ScreenKind::Sao)));
+        assert_eq!(fallback("none"), Ok(None));
+        let known = "ssao, alchemy, sao, hbao, hbao-plus, gtao, none";
+        assert_eq!(
+            fallback("psao").unwrap_err().to_string(),
+            format!("there is no fallback \"psao\": choose from {known}")
+        );
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use dapple_client::viewer::{DebugView, Method};
+use dapple_render::screen_space::ScreenKind;
 
 use serde::Deserialize;
 
@@ -65,6 +66,12 @@ pub(crate) struct ViewArgs {
     /// The other method of a split picture.
     #[arg(long, value_enum, default_value = "none")]
     pub(crate) other: ViewMethod,
+    /// What stands in for points while there are none: a screen-space method, or none.
+    #[arg(long, value_enum, value_name = "METHOD", default_value = "none")]
+    pub(crate) fallback: ViewMethod,
+    /// How far beyond the picture screen-space methods look, as a part of its height, 0 to 0.5.
+    #[arg(long, value_name = "PART", default_value_t = 0.1)]
+    pub(crate) guard_band: f32,
     /// Seconds that an update fades in over; 0 for none [default: as long as updates are apart, at most half a second; 0 with --headless].
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) fade: Option<f32>,
@@ -145,16 +152,44 @@ pub(crate) enum ViewMethod {
     Psao,
     /// Points, by the paper's look-up.
     PsaoPaper,
+    /// Screen space: random places in a hemisphere.
+    Ssao,
+    /// Screen space: AlchemyAO.
+    Alchemy,
+    /// Screen space: scalable ambient obscurance.
+    Sao,
+    /// Screen space: horizons.
+    Hbao,
+    /// Screen space: HBAO+.
+    HbaoPlus,
+    /// Screen space: GTAO with a visibility bitmask.
+    Gtao,
     /// No occlusion.
     None,
 }
 
+impl ViewMethod {
+    /// Which screen-space method it is, if it is one.
+    pub(crate) fn screen_space(self) -> Option<ScreenKind> {
+        Some(match self {
+            ViewMethod::Ssao => ScreenKind::Ssao,
+            ViewMethod::Alchemy => ScreenKind::Alchemy,
+            ViewMethod::Sao => ScreenKind::Sao,
+            ViewMethod::Hbao => ScreenKind::Hbao,
+            ViewMethod::HbaoPlus => ScreenKind::HbaoPlus,
+            ViewMethod::Gtao => ScreenKind::Gtao,
+            ViewMethod::Psao | ViewMethod::PsaoPaper | ViewMethod::None => return None,
+        })
+    }
+}
+
 impl From<ViewMethod> for Method {
     fn from(method: ViewMethod) -> Method {
-        match method {
-            ViewMethod::Psao => Method::Psao,
-            ViewMethod::PsaoPaper => Method::PsaoPaper,
-            ViewMethod::None => Method::None,
+        match (method, method.screen_space()) {
+            (_, Some(kind)) => Method::Screen(kind),
+            (ViewMethod::Psao, _) => Method::Psao,
+            (ViewMethod::PsaoPaper, _) => Method::PsaoPaper,
+            _ => Method::None,
         }
     }
 }

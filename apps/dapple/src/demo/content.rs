@@ -12,7 +12,7 @@ use crate::light::{Take, record};
 use crate::page::{FILE_NAME, ViewerJson};
 use crate::picture::write_file;
 use crate::progress::Bar;
-use crate::source::Loaded;
+use crate::source::{Loaded, resolve_radius};
 
 const SCENE: &str = "scene.glb";
 const STREAM: &str = "scene.dapple";
@@ -44,8 +44,13 @@ pub(super) fn make(args: &DemoArgs) -> Result<()> {
     let _ = std::fs::remove_file(args.out.join(MADE));
     write_file(&args.out.join(SCENE), &glb)?;
     write_file(&args.out.join(STREAM), &taken.bytes)?;
-    let json =
-        ViewerJson { scene: SCENE.to_owned(), stream: Some(STREAM.to_owned()), ..ViewerJson::default() };
+    let (radius_m, _) = resolve_radius(&loaded.scene, &args.light.visibility)?;
+    let json = ViewerJson {
+        scene: SCENE.to_owned(),
+        stream: Some(STREAM.to_owned()),
+        radius: Some(radius_m),
+        ..ViewerJson::default()
+    };
     write_file(&args.out.join(FILE_NAME), &serde_json::to_vec_pretty(&json)?)?;
     write_file(&args.out.join(MADE), key.as_bytes())?;
     say!(

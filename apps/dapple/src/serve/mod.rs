@@ -138,7 +138,7 @@ pub(crate) fn run(args: &ServeArgs) -> Result<()> {
     let (stop_accepting, stop) = watch::channel(false);
     let most = args.max_viewers as usize + OTHER_CONNECTIONS;
     let (moq, publishing) = start_moq(args, &hub, &runtime, first_group, most)?.unzip();
-    let router = web::router(hub.clone(), asset.clone(), work, page, moq);
+    let router = web::router(hub.clone(), asset.clone(), work, page, moq, config.update.radius_m);
     raise_file_limit(most as u64 + 64);
     let is_secure = tls.is_some();
     runtime.spawn(accept::accept(listener, router, tls, most, stop));

@@ -49,19 +49,21 @@ struct ViewerJsons {
     own: Arc<str>,
 }
 
-/// Everything that is served; `page` is the built page's folder, where there is one.
+/// Everything that is served; `radius_m` is that of its light, `page` is the built page's folder, where there is one.
 pub(crate) fn router(
     hub: SharedHub,
     asset: Arc<Asset>,
     work: Option<Arc<WorkHub>>,
     page: Option<PathBuf>,
     moq: Option<MoqJson>,
+    radius_m: f32,
 ) -> Router {
     let json = ViewerJson {
         scene: format!("{SCENE_FOLDER}/{}", asset.name),
         stream: None,
         live: Some(LIVE_PATH.to_owned()),
         moq: None,
+        radius: Some(radius_m),
         animation: asset.scene.active_animation.filter(|index| *index != 0),
         spares: asset
             .spares

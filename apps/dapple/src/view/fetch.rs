@@ -30,6 +30,8 @@ pub(super) struct Fetched {
     pub(super) live: Option<String>,
     /// Where it is over MoQ.
     pub(super) moq: Option<MoqJson>,
+    /// How far away what blocks may be, metres, if the folder says so.
+    pub(super) radius_m: Option<f32>,
 }
 
 /// The next bytes, or why there are no more; the channel closes after the last.
@@ -75,7 +77,14 @@ pub(super) fn fetch(url: &str) -> Result<Fetched> {
         Some(stream) => Some(get_pieces(resolve(url, stream)?)?),
         None => None,
     };
-    Ok(Fetched { scene, title: scene_address, stream, live, moq: json.moq })
+    Ok(Fetched {
+        scene,
+        title: scene_address,
+        stream,
+        live,
+        moq: json.moq,
+        radius_m: json.radius.filter(|r| *r > 0.0 && r.is_finite()),
+    })
 }
 
 fn open(address: &str) -> Result<(impl Read + Send + use<>, Option<u64>)> {

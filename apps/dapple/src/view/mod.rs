@@ -21,9 +21,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::{Result, bail};
-use dapple_client::viewer::DrawOptions;
+use dapple_client::viewer::{DrawOptions, ScreenOptions};
 
-use crate::args::{LightArgs, ViewArgs};
+use crate::args::{LightArgs, ViewArgs, ViewMethod};
 use crate::live::Address;
 use crate::source;
 
@@ -81,6 +81,12 @@ fn check(args: &ViewArgs) -> Result<()> {
     if args.fade.is_some_and(|seconds| !(0.0..=10.0).contains(&seconds)) {
         bail!("--fade must be 0 to 10 seconds");
     }
+    if args.fallback.screen_space().is_none() && args.fallback != ViewMethod::None {
+        bail!("--fallback stands in for points: choose a screen-space method (as sao), or none");
+    }
+    if !(0.0..=0.5).contains(&args.guard_band) {
+        bail!("--guard-band is {}, must be 0 to 0.5", args.guard_band);
+    }
     if let Some(file) = &args.record_path {
         if !source::is_path_file(&file.to_string_lossy()) {
             bail!("--record-path {} would hold a camera path: name it .json", file.display());
@@ -103,10 +109,12 @@ fn open(args: &ViewArgs) -> Result<Opening> {
         visibility: args.visibility.clone(),
         step: args.step,
     };
+    let mut radius_m = None;
     let (scene, title, feed) = match &args.url {
         Some(url) => {
             let fetched = fetch::fetch(url)?;
             let scene = Arc::new(fetched.scene);
+            radius_m = fetched.radius_m;
             let live = Address::choose(url, fetched.live, fetched.moq, args.moq.as_deref())?;
             let feed = match (live, fetched.stream) {
                 (Some(address), _) => {
@@ -149,6 +157,18 @@ fn open(args: &ViewArgs) -> Result<Opening> {
         None if args.view == crate::args::ViewKind::Error => Some((0.0, other)),
         None => None,
     };
-    let options = DrawOptions { view: args.view.into(), method: args.method.into(), split, fade_s, ..usual };
+    let radius_m = match radius_m {
+        Some(radius_m) => radius_m,
+        None => source::resolve_radius(&scene, &args.visibility)?.0,
+    };
+    let options = DrawOptions {
+        view: args.view.into(),
+        method: args.method.into(),
+        split,
+        fade_s,
+        fallback: args.fallback.screen_space(),
+        screen: ScreenOptions { radius_m, guard_band: args.guard_band },
+        ..usual
+    };
     Ok(Opening { scene, title, feed, steering, options, quality, light })
 }

@@ -2,6 +2,8 @@
 
 use dapple_client::viewer::{DebugView, Method};
 
+use dapple_render::screen_space::ScreenKind;
+
 use crate::args::{Preset, ViewArgs};
 
 /// How much effort is made.
@@ -36,8 +38,21 @@ impl Quality {
 pub(super) const PRESETS: [(Preset, &str); 3] =
     [(Preset::Phone, "phone"), (Preset::Headset, "headset"), (Preset::Desktop, "desktop")];
 
-pub(super) const METHODS: [(Method, &str); 3] =
-    [(Method::Psao, "psao"), (Method::PsaoPaper, "psao-paper"), (Method::None, "none")];
+pub(super) const METHODS: [(Method, &str); 9] = [
+    (Method::Psao, "psao"),
+    (Method::PsaoPaper, "psao-paper"),
+    screen(ScreenKind::Ssao),
+    screen(ScreenKind::Alchemy),
+    screen(ScreenKind::Sao),
+    screen(ScreenKind::Hbao),
+    screen(ScreenKind::HbaoPlus),
+    screen(ScreenKind::Gtao),
+    (Method::None, "none"),
+];
+
+const fn screen(kind: ScreenKind) -> (Method, &'static str) {
+    (Method::Screen(kind), kind.name())
+}
 
 pub(super) const VIEWS: [(DebugView, &str); 8] = [
     (DebugView::Beauty, "beauty"),

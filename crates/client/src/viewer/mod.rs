@@ -12,6 +12,7 @@ mod light;
 mod options;
 mod paper;
 mod received;
+mod screen;
 #[cfg(test)]
 mod tests;
 
@@ -21,6 +22,7 @@ use dapple_gpu::{Gpu, wgpu};
 use dapple_render::forward::{
     Forward, FrameInputs, GpuPoints, GpuScene, GpuSceneOptions, LookupId, Rect, Transparency, View, ViewKind,
 };
+use dapple_render::screen_space::{ScreenKind, ScreenPasses};
 use dapple_scene::{Edits, Pose, PosedCamera, Scene};
 use dapple_store::points::PointStore;
 use dapple_stream::{Applied, ReceiveError};
@@ -28,9 +30,12 @@ use dapple_stream::{Applied, ReceiveError};
 use crate::{Picked, pick};
 use anchors::Anchors;
 use light::Light;
-pub use options::{DebugView, DrawOptions, LoadProgress, Method, ViewerConfig, ViewerError, ViewerStats};
+pub use options::{
+    DebugView, DrawOptions, LoadProgress, Method, ScreenOptions, ViewerConfig, ViewerError, ViewerStats,
+};
 use paper::PaperLookup;
 use received::Received;
+use screen::ScreenSpace;
 
 /// One viewer's copy of the light on a graphics card, and the passes that draw with it.
 pub struct Viewer {
@@ -42,6 +47,7 @@ pub struct Viewer {
     forward: Forward,
     transparency: Transparency,
     paper: PaperLookup,
+    screen: ScreenSpace,
     points: Option<PointsShown>,
     stats: ViewerStats,
     /// The caller's clock and the fade that was asked for when it last drew.
@@ -71,7 +77,7 @@ impl Viewer {
             gpu,
             config.format.remove_srgb_suffix(),
             config.samples,
-            &[PaperLookup::lookup(gpu)],
+            &[PaperLookup::lookup(gpu), ScreenPasses::lookup(gpu), ScreenPasses::lookup(gpu)],
         )?;
         Ok(Viewer {
             light: Light::new(scene.clone(), received),
@@ -81,6 +87,7 @@ impl Viewer {
             forward,
             transparency: Transparency::Blend,
             paper: PaperLookup::default(),
+            screen: ScreenSpace::new(),
             points: None,
             stats: ViewerStats::default(),
             now_s: 0.0,
@@ -215,8 +222,20 @@ impl Viewer {
                 _ => {}
             }
         }
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let shown = methods.map(|method| method.map(|method| self.standing_in(method, options)));
+        let on_screen: Vec<ScreenKind> = shown
+            .into_iter()
+            .filter_map(|method| match method {
+                Some(Method::Screen(kind)) => Some(kind),
+                _ => None,
+            })
+            .collect();
+        let picture = screen::Picture { scene: &mut self.gpu_scene, pose: &pose, camera, size };
+        self.screen.draw(gpu, &mut encoder, &mut self.forward, picture, &on_screen, &options.screen)?;
         // What a look-up cannot show is open.
-        let lookup = |method| match method {
+        let lookup = |method| match self.standing_in(method, options) {
+            Method::Screen(kind) => self.screen.lookup(kind),
             Method::Psao if self.light.problem().is_none() => LookupId::ATLAS,
             Method::PsaoPaper if self.paper.problem().is_none() => paper::ID,
             _ => LookupId::NONE,
@@ -231,11 +250,18 @@ impl Viewer {
             fade: self.light.fade(now_s, options.fade_s),
             views: &views,
         };
-        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let drawn = self.forward.draw(gpu, &mut encoder, target, size, &mut self.gpu_scene, &inputs)?;
         self.stats.ignored_lights = drawn.ignored_lights;
         gpu.queue.submit([encoder.finish()]);
         gpu.take_fault().map_or(Ok(()), |fault| Err(fault.into()))
+    }
+
+    /// The method that is drawn where one is asked for.
+    fn standing_in(&self, method: Method, options: &DrawOptions) -> Method {
+        match (method, options.fallback) {
+            (Method::Psao | Method::PsaoPaper, Some(kind)) if self.store().is_none() => Method::Screen(kind),
+            _ => method,
+        }
     }
 
     fn place_points(&mut self, gpu: &Gpu, pose: &Pose) {
@@ -265,7 +291,7 @@ impl Viewer {
     /// Why a look-up that was drawn with cannot show the points that there are: too many for the device or for the look-up's
     /// structure. `None` if all is well; another layout, or another viewer, may do better.
     pub fn problem(&self) -> Option<&str> {
-        self.light.problem().or(self.paper.problem())
+        self.light.problem().or(self.paper.problem()).or(self.screen.problem())
     }
 
     /// Figures for an overlay. Looks at all that is held: a few times a second is enough.

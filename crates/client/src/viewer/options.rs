@@ -3,6 +3,7 @@
 use dapple_gpu::{GpuFault, wgpu};
 use dapple_render::forward::ForwardError;
 use dapple_render::image::ToneMap;
+use dapple_render::screen_space::ScreenKind;
 use dapple_render::shade::ShadeParams;
 use dapple_stream::Limits;
 
@@ -40,6 +41,23 @@ pub enum Method {
     Psao,
     /// Points, by the paper's look-up ([Neff2023] sec. 3.5).
     PsaoPaper,
+    /// From the picture alone, without points.
+    Screen(ScreenKind),
+}
+
+/// What methods that look at the picture alone are given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScreenOptions {
+    /// How far away what blocks may be, metres, > 0; default 0.6.
+    pub radius_m: f32,
+    /// How far beyond the picture is looked, as a part of its height, 0 … 0.5; default 0.1.
+    pub guard_band: f32,
+}
+
+impl Default for ScreenOptions {
+    fn default() -> Self {
+        ScreenOptions { radius_m: 0.6, guard_band: 0.1 }
+    }
 }
 
 /// What a picture shows.
@@ -73,6 +91,10 @@ pub struct DrawOptions {
     pub method: Method,
     /// Right of this part of the width (0 … 1) the other method is shown.
     pub split: Option<(f32, Method)>,
+    /// What stands in for points while there are none: before the first snapshot, or where none ever come. `None` (default): everything is open.
+    pub fallback: Option<ScreenKind>,
+    /// Of methods that look at the picture alone, the fallback among them.
+    pub screen: ScreenOptions,
     /// Fade from the last update to this one over so many seconds, 0 …; 0 shows updates as they come. `None` (default)
     /// follows the pace of updates, so that a fade is over when the next one comes: [`Pace`](crate::pace::Pace).
     pub fade_s: Option<f32>,

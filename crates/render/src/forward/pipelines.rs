@@ -93,8 +93,11 @@ pub(super) struct PipelineKey {
 pub(super) struct Pipelines {
     format: wgpu::TextureFormat,
     samples: u32,
-    lookups: Vec<StagePipelines>,
-    geometry: StagePipelines,
+    lookups: Vec<Lookup>,
+    /// Frame, material, surface.
+    groups: [wgpu::BindGroupLayout; 3],
+    /// Modules, each made when it is first needed: most pictures need one.
+    stages: BTreeMap<Stage, StagePipelines>,
     made: BTreeMap<PipelineKey, wgpu::RenderPipeline>,
     pub(super) points: wgpu::RenderPipeline,
     pub(super) error: wgpu::RenderPipeline,
@@ -111,35 +114,45 @@ impl Pipelines {
     pub(super) fn new(gpu: &Gpu, format: wgpu::TextureFormat, samples: u32, lookups: &[Lookup]) -> Pipelines {
         let device = &gpu.device;
         let groups = [layouts::frame(device), layouts::material(device), layouts::surface(device)];
-        let stage = |label, wgsl: &str, needs_rest, own: Option<&wgpu::BindGroupLayout>| {
-            let layouts: Vec<_> = groups.iter().chain(own).map(Some).collect();
-            StagePipelines {
-                module: shader_module(device, label, wgsl),
-                layout: device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                    label: Some(label),
-                    bind_group_layouts: &layouts,
-                    immediate_size: 0,
-                }),
-                needs_rest,
-            }
-        };
-        let lookups = lookups.iter().map(|lookup| {
-            stage(lookup.label, &forward_module(lookup), lookup.needs_rest, lookup.layout.as_ref())
-        });
         Pipelines {
             format,
             samples,
-            lookups: lookups.collect(),
-            geometry: stage("geometry", &geometry_module(), false, None),
+            lookups: lookups.to_vec(),
+            stages: BTreeMap::new(),
             made: BTreeMap::new(),
             points: points(device, &groups[0], format, samples),
             error: error(device, format, samples),
+            groups,
+        }
+    }
+
+    fn make_stage(&self, device: &wgpu::Device, stage: Stage) -> StagePipelines {
+        let (label, wgsl, needs_rest, own) = match stage {
+            Stage::Picture(lookup) => {
+                let lookup = &self.lookups[lookup];
+                (lookup.label, forward_module(lookup), lookup.needs_rest, lookup.layout.as_ref())
+            }
+            Stage::Geometry => ("geometry", geometry_module(), false, None),
+        };
+        let layouts: Vec<_> = self.groups.iter().chain(own).map(Some).collect();
+        StagePipelines {
+            module: shader_module(device, label, &wgsl),
+            layout: device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some(label),
+                bind_group_layouts: &layouts,
+                immediate_size: 0,
+            }),
+            needs_rest,
         }
     }
 
     /// Makes a pipeline unless it is there already.
     pub(super) fn prepare(&mut self, gpu: &Gpu, key: PipelineKey) {
         if !self.made.contains_key(&key) {
+            if !self.stages.contains_key(&key.stage) {
+                let stage = self.make_stage(&gpu.device, key.stage);
+                self.stages.insert(key.stage, stage);
+            }
             let pipeline = self.make(gpu, key);
             self.made.insert(key, pipeline);
         }
@@ -151,9 +164,10 @@ impl Pipelines {
     }
 
     fn make(&self, gpu: &Gpu, key: PipelineKey) -> wgpu::RenderPipeline {
-        let (stage, format, samples) = match key.stage {
-            Stage::Picture(lookup) => (&self.lookups[lookup], self.format, self.samples),
-            Stage::Geometry => (&self.geometry, NORMAL_FORMAT, 1),
+        let stage = &self.stages[&key.stage];
+        let (format, samples) = match key.stage {
+            Stage::Picture(_) => (self.format, self.samples),
+            Stage::Geometry => (NORMAL_FORMAT, 1),
         };
         let flag = |on: bool| f64::from(u8::from(on));
         let rest = ("NEEDS_REST", flag(stage.needs_rest));

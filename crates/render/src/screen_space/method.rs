@@ -8,6 +8,59 @@ use crate::hbao::{self, HbaoParams, Horizon};
 use crate::sao::{self, SaoParams};
 use crate::ssao::{self, SsaoParams};
 
+/// Which method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum ScreenKind {
+    /// Random places in a hemisphere.
+    Ssao,
+    /// AlchemyAO.
+    Alchemy,
+    /// Scalable ambient obscurance.
+    Sao,
+    /// Horizon-based.
+    Hbao,
+    /// HBAO+.
+    HbaoPlus,
+    /// GTAO with a visibility bitmask.
+    Gtao,
+}
+
+impl ScreenKind {
+    /// All, the simplest first.
+    pub const ALL: [ScreenKind; 6] = [
+        ScreenKind::Ssao,
+        ScreenKind::Alchemy,
+        ScreenKind::Sao,
+        ScreenKind::Hbao,
+        ScreenKind::HbaoPlus,
+        ScreenKind::Gtao,
+    ];
+
+    /// As programs name it: lower case, words joined by hyphens.
+    pub const fn name(self) -> &'static str {
+        match self {
+            ScreenKind::Ssao => "ssao",
+            ScreenKind::Alchemy => "alchemy",
+            ScreenKind::Sao => "sao",
+            ScreenKind::Hbao => "hbao",
+            ScreenKind::HbaoPlus => "hbao-plus",
+            ScreenKind::Gtao => "gtao",
+        }
+    }
+
+    /// With its defaults.
+    pub fn method(self) -> ScreenMethod {
+        match self {
+            ScreenKind::Ssao => ScreenMethod::Ssao(SsaoParams::default()),
+            ScreenKind::Alchemy => ScreenMethod::Alchemy(AlchemyParams::default()),
+            ScreenKind::Sao => ScreenMethod::Sao(SaoParams::default()),
+            ScreenKind::Hbao => ScreenMethod::Hbao(HbaoParams::hbao()),
+            ScreenKind::HbaoPlus => ScreenMethod::Hbao(HbaoParams::hbao_plus()),
+            ScreenKind::Gtao => ScreenMethod::Gtao(GtaoParams::default()),
+        }
+    }
+}
+
 /// A screen-space method with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ScreenMethod {
@@ -24,33 +77,16 @@ pub enum ScreenMethod {
 }
 
 impl ScreenMethod {
-    /// All with their defaults, the simplest first.
-    pub fn all() -> [ScreenMethod; 6] {
-        [
-            ScreenMethod::Ssao(SsaoParams::default()),
-            ScreenMethod::Alchemy(AlchemyParams::default()),
-            ScreenMethod::Sao(SaoParams::default()),
-            ScreenMethod::Hbao(HbaoParams::hbao()),
-            ScreenMethod::Hbao(HbaoParams::hbao_plus()),
-            ScreenMethod::Gtao(GtaoParams::default()),
-        ]
-    }
-
-    /// As programs name it: lower case, words joined by hyphens.
-    pub fn name(&self) -> &'static str {
+    /// Which it is.
+    pub fn kind(&self) -> ScreenKind {
         match self {
-            ScreenMethod::Ssao(_) => "ssao",
-            ScreenMethod::Alchemy(_) => "alchemy",
-            ScreenMethod::Sao(_) => "sao",
-            ScreenMethod::Hbao(HbaoParams { horizon: Horizon::Highest, .. }) => "hbao",
-            ScreenMethod::Hbao(HbaoParams { horizon: Horizon::Mean, .. }) => "hbao-plus",
-            ScreenMethod::Gtao(_) => "gtao",
+            ScreenMethod::Ssao(_) => ScreenKind::Ssao,
+            ScreenMethod::Alchemy(_) => ScreenKind::Alchemy,
+            ScreenMethod::Sao(_) => ScreenKind::Sao,
+            ScreenMethod::Hbao(HbaoParams { horizon: Horizon::Highest, .. }) => ScreenKind::Hbao,
+            ScreenMethod::Hbao(HbaoParams { horizon: Horizon::Mean, .. }) => ScreenKind::HbaoPlus,
+            ScreenMethod::Gtao(_) => ScreenKind::Gtao,
         }
-    }
-
-    /// The method of a name with its defaults.
-    pub fn named(name: &str) -> Option<ScreenMethod> {
-        ScreenMethod::all().into_iter().find(|method| method.name() == name)
     }
 
     /// The same with another occlusion distance, metres.

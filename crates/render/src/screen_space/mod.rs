@@ -11,6 +11,6 @@ mod tests;
 #[cfg(feature = "gpu")]
 mod uniforms;
 
-pub use method::ScreenMethod;
+pub use method::{ScreenKind, ScreenMethod};
 #[cfg(feature = "gpu")]
 pub use passes::ScreenPasses;

@@ -12,7 +12,7 @@ use glam::Vec3;
 
 use super::plan::Shader;
 use super::uniforms::*;
-use super::{ScreenMethod, ScreenPasses};
+use super::{ScreenKind, ScreenMethod, ScreenPasses};
 use crate::forward::{Forward, GpuScene, GpuSceneOptions, LookupId};
 use crate::sao::{MipFilter, SaoParams};
 use crate::testing::Stage;
@@ -132,7 +132,7 @@ fn methods() -> Vec<ScreenMethod> {
             ..SaoParams::default()
         })
     });
-    ScreenMethod::all().into_iter().chain(filters).collect()
+    ScreenKind::ALL.map(ScreenKind::method).into_iter().chain(filters).collect()
 }
 
 #[test]
@@ -162,7 +162,7 @@ fn card_and_twin_agree() {
                 let (part, mean) = (within as f64 / f64::from(seen), sum / f64::from(seen));
                 eprintln!(
                     "{} {size:?} {:?}: {part:.4} within, mean {mean:.5}",
-                    method.name(),
+                    method.kind().name(),
                     camera.projection
                 );
                 assert!(seen > size[0] * size[1] * 99 / 100, "{method:?}: {seen}");

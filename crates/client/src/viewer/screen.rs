@@ -1,0 +1,87 @@
+//! Methods that look at the picture alone, each made when it is first asked for.
+
+use dapple_gpu::{Gpu, wgpu};
+use dapple_render::forward::{Forward, ForwardError, GpuScene, LookupId};
+use dapple_render::screen_space::{ScreenKind, ScreenPasses};
+use dapple_scene::{Pose, PosedCamera};
+
+use super::options::ScreenOptions;
+
+/// A picture shows at most two methods: each has a look-up of its own, after the paper's.
+pub(super) const IDS: [LookupId; 2] = [LookupId::added(1), LookupId::added(2)];
+
+/// One look-up's passes.
+enum Slot {
+    Unmade,
+    Made(Box<ScreenPasses>),
+    /// The device cannot, and why.
+    Failed(String),
+}
+
+/// The passes of a viewer.
+pub(super) struct ScreenSpace {
+    slots: [Slot; 2],
+    /// Of the picture that is being drawn.
+    kinds: [Option<ScreenKind>; 2],
+}
+
+/// What is drawn with the methods.
+pub(super) struct Picture<'a> {
+    pub(super) scene: &'a mut GpuScene,
+    pub(super) pose: &'a Pose,
+    pub(super) camera: &'a PosedCamera,
+    pub(super) size: (u32, u32),
+}
+
+impl ScreenSpace {
+    pub(super) fn new() -> ScreenSpace {
+        ScreenSpace { slots: [Slot::Unmade, Slot::Unmade], kinds: [None; 2] }
+    }
+
+    /// Records the passes of the methods that a picture shows.
+    pub(super) fn draw(
+        &mut self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        forward: &mut Forward,
+        picture: Picture<'_>,
+        wanted: &[ScreenKind],
+        options: &ScreenOptions,
+    ) -> Result<(), ForwardError> {
+        self.kinds = [None; 2];
+        let Picture { scene, pose, camera, size } = picture;
+        let guard = (f64::from(options.guard_band.clamp(0.0, 0.5)) * f64::from(size.1)).round() as u32;
+        for &kind in wanted {
+            if self.kinds.contains(&Some(kind)) {
+                continue;
+            }
+            let Some(index) = self.kinds.iter().position(Option::is_none) else { break };
+            let slot = &mut self.slots[index];
+            if matches!(slot, Slot::Unmade) {
+                *slot = match ScreenPasses::new(gpu, IDS[index]) {
+                    Ok(passes) => Slot::Made(Box::new(passes)),
+                    Err(error) => Slot::Failed(error.to_string()),
+                };
+            }
+            let Slot::Made(passes) = slot else { continue };
+            let method = kind.method().with_radius(options.radius_m);
+            passes.draw(gpu, encoder, forward, scene, pose, camera, size, &method, guard)?;
+            self.kinds[index] = Some(kind);
+        }
+        Ok(())
+    }
+
+    /// Where the forward pass finds what a method of the last [`ScreenSpace::draw`] has found.
+    pub(super) fn lookup(&self, kind: ScreenKind) -> LookupId {
+        let index = self.kinds.iter().position(|drawn| *drawn == Some(kind));
+        index.map_or(LookupId::NONE, |index| IDS[index])
+    }
+
+    /// Why a method cannot be shown, if so.
+    pub(super) fn problem(&self) -> Option<&str> {
+        self.slots.iter().find_map(|slot| match slot {
+            Slot::Failed(problem) => Some(problem.as_str()),
+            _ => None,
+        })
+    }
+}
