@@ -33,5 +33,6 @@ pub mod psao;
 pub mod sao;
 pub mod shade;
 pub mod ssao;
+pub mod upsample;
 
 pub use error::RenderError;

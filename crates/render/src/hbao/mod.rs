@@ -123,8 +123,8 @@ fn occlusion_at(screen: &Screen, params: &HbaoParams, at: [usize; 2]) -> f32 {
         sum += match params.horizon {
             Horizon::Highest => {
                 // Where the plane of the surface goes in that direction of the picture.
-                let (column, row) = (at[0] as f32 + 0.5 + cos, at[1] as f32 + 0.5 + sin);
-                let along = screen.on_plane(column, row, place, normal).map(|next| next - place);
+                let [column, row] = screen.centre(at);
+                let along = screen.on_plane(column + cos, row + sin, place, normal).map(|next| next - place);
                 // Samples lie beside the direction by up to half of one each way: the plane must not rise over itself for that.
                 let steps =
                     steps.filter(|(to_seen, _)| normal.dot(*to_seen) > libm::sinf(bias) * to_seen.length());

@@ -46,7 +46,7 @@ fn visibility_at(
         let Some(seen) = screen.neighbour(at, [length * cos, length * sin]) else { continue };
         // Eq. 9: the higher the farther it is on the screen.
         let level = (length as u32).checked_ilog2().unwrap_or(0).saturating_sub(params.switch_log2);
-        let (seen_m, [column, row]) = pyramid.read((level as usize).min(top), seen);
+        let (seen_m, [column, row]) = pyramid.read(screen, (level as usize).min(top), seen);
         if seen_m.is_finite() {
             sum += estimator.term(screen.place_view(column, row, seen_m) - place, normal, -place.z);
         }
