@@ -90,8 +90,10 @@ mod tests {
     use crate::ssao::{self, SsaoParams};
     use crate::testing::screen::{check_pictures, check_walls, draw, look, still_life};
 
+    type Method = Box<dyn Fn(&Screen) -> Vec<f32> + Sync>;
+
     /// Every method with its defaults.
-    fn methods() -> Vec<(&'static str, Box<dyn Fn(&Screen) -> Vec<f32> + Sync>)> {
+    fn methods() -> Vec<(&'static str, Method)> {
         vec![
             ("ssao", Box::new(|s| ssao::estimate_visibility(s, &SsaoParams::default()).unwrap())),
             ("alchemy", Box::new(|s| alchemy::estimate_visibility(s, &AlchemyParams::default()).unwrap())),

@@ -2,7 +2,7 @@
 
 use dapple_scene::{Pose, PosedCamera, Projection, Scene};
 
-use super::{GBuffer, Screen, rasterize};
+use super::{GBuffer, rasterize};
 use crate::RenderError;
 
 /// How many pixels are drawn beyond each side of a picture. [`GuardBand::default`] is none.
@@ -62,23 +62,20 @@ impl GuardBand {
         PosedCamera { projection, ..*camera }
     }
 
-    /// Draws the picture of `camera` with the band around it.
+    /// Draws what `camera` sees in a picture of so many pixels, and the band around it. What is drawn is that of [`GuardBand::camera`].
     ///
     /// # Errors
     /// As of [`rasterize`], of the larger size.
-    pub fn draw(
+    pub fn rasterize(
         self,
         scene: &Scene,
         pose: &Pose,
         camera: &PosedCamera,
         size: [u32; 2],
         samples_per_axis: u32,
-    ) -> Result<(GBuffer, Screen), RenderError> {
-        let camera = self.camera(camera, size[1]);
+    ) -> Result<GBuffer, RenderError> {
         let [width, height] = self.size(size);
-        let gbuffer = rasterize(scene, pose, &camera, width, height, samples_per_axis)?;
-        let screen = gbuffer.screen(scene, pose, &camera)?;
-        Ok((gbuffer, screen))
+        rasterize(scene, pose, &self.camera(camera, size[1]), width, height, samples_per_axis)
     }
 
     /// Of one value a sample of what is drawn those of the picture, row-major from the top.
@@ -107,6 +104,7 @@ mod tests {
 
     use super::*;
     use crate::alchemy::{self, AlchemyParams};
+    use crate::gbuffer::Screen;
     use crate::testing::screen::{draw, look, still_life};
     use crate::testing::{Stage, cube, ground};
 
@@ -117,6 +115,18 @@ mod tests {
         ]
     }
 
+    fn draw_wide(
+        stage: &Stage,
+        camera: &PosedCamera,
+        band: GuardBand,
+        size: [u32; 2],
+        samples_per_axis: u32,
+    ) -> (GBuffer, Screen) {
+        let gbuffer = band.rasterize(&stage.scene, &stage.pose, camera, size, samples_per_axis).unwrap();
+        let screen = gbuffer.screen(&stage.scene, &stage.pose, &band.camera(camera, size[1])).unwrap();
+        (gbuffer, screen)
+    }
+
     #[test]
     fn the_picture_inside_is_the_one_without() {
         let stage = still_life();
@@ -124,7 +134,7 @@ mod tests {
             let camera = PosedCamera { projection, ..look(Vec3::new(1.5, 2.0, 3.0), Vec3::ZERO) };
             for (size, n) in [([61, 37], 2), ([33, 64], 1), ([1, 1], 3)] {
                 let band = GuardBand::of_height(part, size[1]).unwrap();
-                let (wide, wide_screen) = band.draw(&stage.scene, &stage.pose, &camera, size, n).unwrap();
+                let (wide, wide_screen) = draw_wide(&stage, &camera, band, size, n);
                 let narrow = rasterize(&stage.scene, &stage.pose, &camera, size[0], size[1], n).unwrap();
                 let screen = narrow.screen(&stage.scene, &stage.pose, &camera).unwrap();
                 let inside = band.crop(wide.samples(), size, n).unwrap();
@@ -168,7 +178,7 @@ mod tests {
     fn estimate(stage: &Stage, camera: &PosedCamera, part: f32) -> Vec<f32> {
         let size = [96, 96];
         let band = GuardBand::of_height(part, size[1]).unwrap();
-        let (_, screen) = band.draw(&stage.scene, &stage.pose, camera, size, 1).unwrap();
+        let (_, screen) = draw_wide(stage, camera, band, size, 1);
         let values = alchemy::estimate_visibility(&screen, &AlchemyParams::default()).unwrap();
         band.crop(&values, size, 1).unwrap()
     }

@@ -4,7 +4,7 @@ use dapple_scene::{Pose, PosedCamera, Projection, Scene};
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 
-use super::GBuffer;
+use super::{GBuffer, Sample};
 use crate::{RenderError, projection};
 
 /// Distance and normal of every sample, and the lens that brings samples back to places. View space: right-handed, x right,
@@ -31,6 +31,16 @@ struct Lens {
 }
 
 impl GBuffer {
+    /// Distance of each sample along the view axis, metres, row-major from the top; infinite for the background. What a method that needs no normals is given:
+    /// \[McGuire2012\] eq. 2. `camera` must be the one that was drawn.
+    pub fn distances_m(&self, camera: &PosedCamera) -> Vec<f32> {
+        let distance = |sample: &Sample| match sample.is_covered() {
+            true => projection::view_distance(&camera.projection, sample.depth),
+            false => f32::INFINITY,
+        };
+        self.samples.par_iter().with_min_len(1024).map(distance).collect()
+    }
+
     /// Distances and normals for screen-space methods. `scene`, `pose` and `camera` must be those that were drawn.
     ///
     /// Normals are those of the posed triangles, as the ray-traced truth uses them, not interpolated or mapped ones.
@@ -253,6 +263,18 @@ mod tests {
             ] {
                 assert_eq!(at(outside), None, "{outside:?}");
             }
+        }
+    }
+
+    #[test]
+    fn distances_alone_are_those_of_the_screen() {
+        for projection in [
+            Projection::Perspective { yfov: 0.8, near: 0.02 },
+            Projection::Orthographic { half_height: 2.0, near: -3.0, far: 20.0 },
+        ] {
+            let camera = PosedCamera { projection, ..look(Vec3::new(1.5, 2.0, 3.0), Vec3::ZERO) };
+            let (gbuffer, screen) = draw(&still_life(), &camera, [61, 37]);
+            assert_eq!(gbuffer.distances_m(&camera), screen.distances_m());
         }
     }
 

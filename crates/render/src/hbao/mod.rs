@@ -5,10 +5,10 @@
 #[cfg(test)]
 mod tests;
 
-use crate::RenderError;
 use crate::bilateral::Bilateral;
 use crate::gbuffer::Screen;
 use crate::noise::interleaved_gradient;
+use crate::{AfterPass, RenderError};
 use glam::Vec3;
 
 /// Most directions, and most steps along each.
@@ -92,10 +92,25 @@ impl HbaoParams {
 /// # Errors
 /// A parameter out of its range.
 pub fn estimate_visibility(screen: &Screen, params: &HbaoParams) -> Result<Vec<f32>, RenderError> {
+    estimate_by_passes(screen, params, &mut |_| ())
+}
+
+/// As [`estimate_visibility`], and tells when each pass is done: `samples`, `blur`.
+///
+/// # Errors
+/// As there.
+pub fn estimate_by_passes(
+    screen: &Screen,
+    params: &HbaoParams,
+    after: AfterPass<'_>,
+) -> Result<Vec<f32>, RenderError> {
     params.check()?;
     let visibility =
         screen.map(|at| 1.0 - (params.strength * occlusion_at(screen, params, at)).clamp(0.0, 1.0));
-    Ok(Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility))
+    after("samples");
+    let visibility = Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility);
+    after("blur");
+    Ok(visibility)
 }
 
 fn occlusion_at(screen: &Screen, params: &HbaoParams, at: [usize; 2]) -> f32 {

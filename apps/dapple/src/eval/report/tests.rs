@@ -133,6 +133,7 @@ fn results(cases: Vec<Case>) -> Results {
         machine: machine(),
         judge: JudgeInfo { pixels_per_degree: 67.0, lpips_weights: None },
         cases,
+        studies: Vec::new(),
         failures: Vec::new(),
         advice: Vec::new(),
     }
