@@ -41,7 +41,7 @@ pub(in crate::eval) struct Settings {
 
 impl Settings {
     /// `small` is the built-in setting, which takes less than a minute.
-    pub(super) fn new(options: &Options, small: bool) -> Result<Settings> {
+    pub(in crate::eval) fn new(options: &Options, small: bool) -> Result<Settings> {
         let options = options.clone();
         let supersample = options.supersample.unwrap_or(2);
         // Zero is refused below.
@@ -54,6 +54,7 @@ impl Settings {
             Method::None,
         ];
         let preset = options.preset;
+        let effort = options.effort();
         let points = preset.map_or(if small { 256.0 } else { 512.0 }, Preset::points_per_m2);
         let settings = Settings {
             methods: distinct(options.methods.unwrap_or(default_methods)),
@@ -78,7 +79,7 @@ impl Settings {
                 budget: options.budget.or(preset.map(Preset::budget)),
                 max_points: options.max_points,
             },
-            effort: options.effort(),
+            effort,
             hdr_flip: options.hdr_flip.unwrap_or(false),
         };
         settings.check()?;

@@ -13,7 +13,7 @@ mod traffic;
 mod z_precision;
 
 use anyhow::{Context, Result, bail};
-use dapple_render::gbuffer::{GBuffer, GuardBand, Screen, rasterize};
+use dapple_render::gbuffer::{GBuffer, GuardBand, Screen};
 use dapple_scene::{Pose, PosedCamera};
 use serde::de::DeserializeOwned;
 
@@ -128,11 +128,6 @@ impl<'a> Subject<'a> {
         let gbuffer = band.rasterize(scene, &moment.pose, &moment.camera, size, 1)?;
         let screen = gbuffer.screen(scene, &moment.pose, &band.camera(&moment.camera, size[1]))?;
         Ok((gbuffer, screen))
-    }
-
-    /// For a method that looks at a picture of so many pixels, one sample a pixel.
-    pub(super) fn picture(&self, moment: &Moment, [width, height]: [u32; 2]) -> Result<GBuffer> {
-        Ok(rasterize(self.stage()?.scene(), &moment.pose, &moment.camera, width, height, 1)?)
     }
 
     pub(super) fn sight<'b>(&'b self, moment: &'b Moment, gbuffer: &'b GBuffer) -> Result<Sight<'b>> {
