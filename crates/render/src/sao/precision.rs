@@ -443,20 +443,53 @@ mod tests {
         [most(|found| found.z_max_m), most(|found| found.normal_max_degrees)]
     }
 
+    const FAR_M: [f64; 3] = [100.0, 1000.0, 1e4];
+
+    fn standard(format: DepthFormat, far_m: Option<f64>) -> Pipeline {
+        Pipeline { format, reversed: false, far_m, ..Pipeline::default() }
+    }
+
+    /// Figure 3: from 24 bits on the format changes nothing with standard z, because what comes before it destroys more; that there is no far plane does.
     #[test]
-    fn findings() {
-        for format in DepthFormat::ALL {
-            for reversed in [false, true] {
-                for far_m in [Some(100.0), Some(1000.0), Some(1e4), None] {
-                    let pipeline = Pipeline { format, reversed, far_m, ..Pipeline::default() };
-                    let single = worst(Pipeline { host_double: false, ..pipeline });
-                    let dot = worst(Pipeline { dot_products: true, ..pipeline });
-                    println!(
-                        "{format} {reversed} {far_m:?}: {:?}, single {single:?}, dot {dot:?}",
-                        worst(pipeline)
-                    );
-                }
-            }
+    fn an_infinite_far_plane_matters_more_than_the_format() {
+        let [_, fixed24, fixed32, float] = DepthFormat::ALL;
+        let infinite = worst(standard(fixed24, None))[0];
+        // The paper has 2 mm, of distances that it does not say.
+        assert!((1e-3..5e-3).contains(&infinite), "{infinite} m");
+        for far_m in FAR_M.map(Some).into_iter().chain([None]) {
+            let [a, b, c] = [fixed24, fixed32, float].map(|format| worst(standard(format, far_m))[0]);
+            assert!((a - b).abs() < 0.02 * a && (a - c).abs() < 0.02 * a, "{far_m:?}: {a}, {b}, {c}");
+            let Some(_) = far_m else { continue };
+            assert!(infinite < 0.85 * a, "{far_m:?}: {a}, without {infinite}");
+            // With matrices in single precision it is more than twice as much.
+            let single = |far_m| worst(Pipeline { host_double: false, ..standard(fixed24, far_m) })[0];
+            let (with, without) = (single(far_m), single(None));
+            assert!(without < 0.5 * with && with > 1.3 * a, "{far_m:?}: {with}, without {without}");
         }
+        // 16 bits are another matter.
+        assert!(worst(standard(DepthFormat::Fixed(16), None))[0] > 0.1);
+    }
+
+    /// Figure 4, and what reversed z makes of both.
+    #[test]
+    fn reversed_single_precision_keeps_normals_within_a_fifth_of_a_degree() {
+        let [z_m, degrees] = worst(Pipeline::default());
+        assert!(z_m < 5e-4 && degrees < 0.2, "{z_m} m, {degrees}");
+        let [standard_m, standard_degrees] = worst(standard(DepthFormat::Fixed(24), None));
+        assert!(standard_m > 10.0 * z_m && standard_degrees > 10.0 * degrees);
+        // Near the eye standard z does, too: the paper's pictures are of rooms.
+        for distance_m in [0.5, 1.0, 2.0] {
+            let near = deviation(&standard(DepthFormat::Fixed(24), None), distance_m, 2000);
+            assert!(near.normal_max_degrees < 0.2 && near.z_max_m < 2e-3, "{near:?}");
+        }
+    }
+
+    #[test]
+    fn deviations_are_the_same_again_and_grow_with_the_distance() {
+        let at = |distance_m| deviation(&standard(DepthFormat::Fixed(24), None), distance_m, 500);
+        assert_eq!(at(3.0), at(3.0));
+        let (near, far) = (at(2.0), at(40.0));
+        assert!(far.z_mean_m > 20.0 * near.z_mean_m, "{near:?}, {far:?}");
+        assert!(far.z_mean_m < far.z_max_m && far.normal_mean_degrees < far.normal_max_degrees);
     }
 }
