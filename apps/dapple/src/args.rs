@@ -16,7 +16,7 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
 
-use crate::screen_space::ScreenSpace;
+use crate::screen_space::{Effort, ScreenSpace};
 
 pub(crate) use bake::BakeArgs;
 pub(crate) use bench::{Bench, BenchArgs, JoinArgs, ServedArgs, SoakArgs, ViewersArgs};
@@ -82,6 +82,7 @@ Examples:
   dapple render city.glb --method psao --points 256 --radius auto --view visibility -o visibility.png
   dapple render --builtin atrium --view error -o error.png        psao against rtao, per pixel
   dapple render --builtin atrium --method ssao --view visibility -o ssao.png
+  dapple render --builtin atrium --method sao --ao-preset low --guard-band 0.2 -o sao.png
   dapple render room.glb --method rtao --view visibility -o visibility.exr";
 
 const QUALITY_EXAMPLES: &str = "\
@@ -138,6 +139,26 @@ pub(crate) struct VisibilityArgs {
     pub(crate) bent_normals: bool,
 }
 
+/// How screen-space methods run.
+#[derive(Debug, Clone, Copy, PartialEq, Args)]
+pub(crate) struct EffortArgs {
+    /// Work of the screen-space methods: low, medium (both at half resolution), high (their defaults) or ultra.
+    #[arg(long, value_name = "PRESET", default_value = "high")]
+    pub(crate) ao_preset: dapple_render::Preset,
+    /// Screen-space methods look at a quarter of the samples, and the rest is filled in along surfaces [default: the preset's].
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL")]
+    pub(crate) half_resolution: Option<bool>,
+    /// How far screen-space methods see beyond the picture, as a part of its height, 0 to 0.5.
+    #[arg(long, value_name = "PART", default_value_t = Effort::GUARD_BAND)]
+    pub(crate) guard_band: f32,
+}
+
+impl EffortArgs {
+    pub(crate) fn effort(self) -> Effort {
+        Effort { preset: self.ao_preset, half_resolution: self.half_resolution, guard_band: self.guard_band }
+    }
+}
+
 /// What a server spends: on each of its steps, and on what it sends.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Args)]
 pub(crate) struct StepArgs {
@@ -190,6 +211,8 @@ pub(crate) struct RenderArgs {
     pub(crate) supersample: u32,
     #[command(flatten)]
     pub(crate) visibility: VisibilityArgs,
+    #[command(flatten)]
+    pub(crate) effort: EffortArgs,
     /// The PNG to write, or the EXR: 32-bit floats, linear and without tone mapping (R, G, B; for visibility and error Y).
     #[arg(short, long, value_name = "FILE.png|FILE.exr")]
     pub(crate) output: PathBuf,

@@ -115,6 +115,7 @@ fn results_report_and_pictures_are_written() {
         let expected: &[&str] = match method {
             "psao" | "psao-hat" => &["hz", "point_rays", "points_per_m2", "threshold"],
             "rtao-4" => &["rays_per_pixel"],
+            "ssao" => &["ao_preset", "guard_band"],
             _ => &[],
         };
         assert_eq!(params.keys().map(String::as_str).collect::<Vec<_>>(), expected, "{method}");

@@ -16,6 +16,7 @@ mod bilateral;
 mod error;
 mod noise;
 mod obscurance;
+mod preset;
 mod projection;
 #[cfg(test)]
 mod testing;
@@ -34,5 +35,11 @@ pub mod sao;
 pub mod screen_space;
 pub mod shade;
 pub mod ssao;
+pub mod upsample;
 
 pub use error::RenderError;
+
+/// Told the name of each pass of a method when it is done, so that a caller with a clock can time them.
+pub type AfterPass<'a> = &'a mut dyn FnMut(&'static str);
+
+pub use preset::{Chosen, Preset, UnknownPreset};

@@ -7,7 +7,10 @@ use clap::Args;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 
+use dapple_render::Preset as AoPreset;
+
 use super::{BitRate, EvalVerb, JudgeArgs, Method, Preset, Radius, Size};
+use crate::screen_space::Effort;
 
 pub(super) const EVAL_EXAMPLES: &str = "\
 Examples:
@@ -48,7 +51,7 @@ pub(crate) struct EvalArgs {
     #[arg(long, conflicts_with_all = [
         "scenes", "builtin", "suite", "detail", "animation", "methods", "frames", "size", "points", "hz", "path",
         "seconds", "reference_rays", "supersample", "radius", "point_rays", "threshold", "seed", "adaptive", "bent_normals", "gather_ambient",
-        "ray_budget", "rays_still", "budget", "preset", "max_points", "hdr_flip", "record", "ppd",
+        "ray_budget", "rays_still", "budget", "preset", "max_points", "ao_preset", "half_resolution", "guard_band", "hdr_flip", "record", "ppd",
     ])]
     pub(crate) smoke: bool,
     /// Threads; 0 is one for each core.
@@ -164,6 +167,16 @@ pub(crate) struct Options {
     /// [default: all points of all instances are there throughout].
     #[arg(long, value_name = "N")]
     pub(crate) max_points: Option<u32>,
+    /// Work of the screen-space methods: low, medium (both at half resolution), high (their defaults) or ultra [default: high].
+    #[arg(long, value_name = "PRESET")]
+    #[serde(deserialize_with = "ao_preset")]
+    pub(crate) ao_preset: Option<AoPreset>,
+    /// Screen-space methods look at a quarter of the samples, and the rest is filled in along surfaces [default: the preset's].
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL")]
+    pub(crate) half_resolution: Option<bool>,
+    /// How far screen-space methods see beyond the picture, as a part of its height, 0 to 0.5 [default: 0.1].
+    #[arg(long, value_name = "PART")]
+    pub(crate) guard_band: Option<f32>,
     /// Also compute HDR-FLIP, on linear light before tone mapping (several times the work of FLIP).
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL")]
     pub(crate) hdr_flip: Option<bool>,
@@ -199,9 +212,27 @@ impl Options {
             budget: self.budget.or(preset.map(Preset::budget)).or(other.budget),
             preset: self.preset.or(other.preset),
             max_points: self.max_points.or(other.max_points),
+            ao_preset: self.ao_preset.or(other.ao_preset),
+            half_resolution: self.half_resolution.or(other.half_resolution),
+            guard_band: self.guard_band.or(other.guard_band),
             hdr_flip: self.hdr_flip.or(other.hdr_flip),
         }
     }
+
+    /// How screen-space methods run.
+    pub(crate) fn effort(&self) -> Effort {
+        Effort {
+            preset: self.ao_preset.unwrap_or_default(),
+            half_resolution: self.half_resolution,
+            guard_band: self.guard_band.unwrap_or(Effort::GUARD_BAND),
+        }
+    }
+}
+
+/// In files, its name.
+fn ao_preset<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<AoPreset>, D::Error> {
+    let name = String::deserialize(deserializer)?;
+    name.parse().map(Some).map_err(|help| D::Error::custom(format!("'{name}': {help}")))
 }
 
 /// In files, a list may be one value, and a text may hold several with commas between them, as on the command line.

@@ -224,7 +224,7 @@ pub(super) fn bytes(count: u64) -> String {
 /// always, the rest where it differs.
 pub(super) fn settings(case: &Case) -> Vec<Setting> {
     type Part = (&'static str, bool, fn(&Params) -> Option<String>);
-    const PARTS: [Part; 9] = [
+    const PARTS: [Part; 12] = [
         ("points_per_m2", true, |p| p.points_per_m2.map(|n| format!("N {n}"))),
         ("hz", true, |p| p.hz.map(|hz| format!("{hz} Hz"))),
         ("rays_per_pixel", true, |p| p.rays_per_pixel.map(|rays| format!("{rays} rays"))),
@@ -236,6 +236,11 @@ pub(super) fn settings(case: &Case) -> Vec<Setting> {
         ("max_points", false, |p| {
             p.max_points.map(|points| format!("at most {} points", number(points.into(), 0)))
         }),
+        ("ao_preset", false, |p| p.ao_preset.clone()),
+        ("half_resolution", false, |p| {
+            p.half_resolution.map(|half| if half { "half resolution" } else { "full resolution" }.to_owned())
+        }),
+        ("guard_band", false, |p| p.guard_band.map(|part| format!("guard band {part}"))),
     ];
     let of_row = |row: &Row| {
         let others = || case.rows.iter().filter(|other| other.method == row.method);

@@ -20,6 +20,7 @@ use super::truth::Cache;
 use crate::args::Method;
 use crate::judge::Judge;
 use crate::picture::{Compared, Shown, sites};
+use crate::screen_space::Sight;
 
 /// What is run together.
 #[derive(Debug, Clone, PartialEq)]
@@ -246,6 +247,7 @@ impl Line {
         now_s: f64,
     ) -> Result<Option<Vec<f32>>> {
         let start = Instant::now();
+        let mut own_time = None;
         let visibility = match (self.method, pair) {
             (method, Some(pair)) => Some(pair.client.visibility(drawn, method)?),
             (Method::Rtao { rays }, _) => {
@@ -265,13 +267,21 @@ impl Line {
                 Some(visibility)
             }
             (Method::Screen(method), _) => {
-                let scene = stage.scene();
-                let screen = drawn.gbuffer.screen(scene, &drawn.pose, &stage.camera_at(drawn))?;
-                Some(method.visibility(&screen, stage.radius_m, stage.settings.seed)?)
+                let sight = Sight {
+                    scene: stage.scene(),
+                    pose: &drawn.pose,
+                    camera: &stage.camera_at(drawn),
+                    gbuffer: &drawn.gbuffer,
+                    radius_m: stage.radius_m,
+                    seed: stage.settings.seed,
+                };
+                let estimate = method.estimate(&sight, stage.settings.effort)?;
+                own_time = Some(estimate.time);
+                Some(estimate.visibility)
             }
             _ => None,
         };
-        self.reconstruct_seconds += start.elapsed().as_secs_f64();
+        self.reconstruct_seconds += own_time.unwrap_or_else(|| start.elapsed()).as_secs_f64();
         self.looks += 1;
         Ok(visibility)
     }
@@ -370,6 +380,7 @@ impl Line {
         // Absent for a method without points.
         let points_per_m2 = pair.and_then(|p| p.points_per_m2);
         let of_points = points_per_m2.map(|_| settings);
+        let effort = matches!(self.method, Method::Screen(_)).then_some(settings.effort);
         let params = Params {
             points_per_m2,
             hz: pair.map(|p| p.hz),
@@ -388,6 +399,9 @@ impl Line {
                 .and_then(|s| s.step.budget)
                 .map(|budget| budget.0 as f64 / 1e3),
             max_points: of_points.and_then(|s| s.step.max_points),
+            ao_preset: effort.map(|e| e.preset.name().to_owned()),
+            half_resolution: effort.and_then(|e| e.half_resolution),
+            guard_band: effort.map(|e| e.guard_band),
             rays_per_pixel: match self.method {
                 Method::Rtao { rays } => Some(rays),
                 _ => None,

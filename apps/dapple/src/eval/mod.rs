@@ -24,6 +24,7 @@ mod settle;
 mod smoke;
 mod stage;
 mod still;
+mod study;
 mod table;
 mod thin;
 mod truth;

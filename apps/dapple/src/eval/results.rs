@@ -17,6 +17,9 @@ pub(crate) struct Results {
     pub(crate) judge: JudgeInfo,
     /// One scene along one path each.
     pub(crate) cases: Vec<Case>,
+    /// What the suite measured beside them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) studies: Vec<StudyResult>,
     /// Scenes that could not be evaluated, or not along all of their paths.
     pub(crate) failures: Vec<Failure>,
     /// What the figures cannot tell, and what to do about it.
@@ -250,6 +253,14 @@ pub(crate) struct Params {
     pub(crate) max_points: Option<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) rays_per_pixel: Option<u32>,
+    /// Of screen-space methods: how much work they do; the resolution where it is not the preset's; and how far they see beyond the
+    /// picture, as a part of its height.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) ao_preset: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) half_resolution: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) guard_band: Option<f32>,
 }
 
 /// One picture of a row.
@@ -272,6 +283,68 @@ pub(crate) struct FrameRow {
     pub(crate) visibility: String,
     pub(crate) error: String,
     pub(crate) flip_map: String,
+}
+
+/// What one study of a suite found.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct StudyResult {
+    /// As the suite names it.
+    pub(crate) kind: String,
+    pub(crate) title: String,
+    /// Scene and path; absent for a study without.
+    pub(crate) subject: Option<String>,
+    /// How it was measured, and what is known elsewhere.
+    pub(crate) notes: Vec<String>,
+    pub(crate) tables: Vec<StudyTable>,
+    pub(crate) plots: Vec<StudyPlot>,
+    /// Where times were taken.
+    pub(crate) machine: Machine,
+}
+
+/// Numbers with names.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct StudyTable {
+    pub(crate) title: String,
+    pub(crate) columns: Vec<StudyColumn>,
+    pub(crate) rows: Vec<StudyRow>,
+}
+
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct StudyColumn {
+    pub(crate) title: String,
+    pub(crate) unit: String,
+    /// Digits after the point, as the table shows them.
+    pub(crate) digits: usize,
+}
+
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct StudyRow {
+    pub(crate) name: String,
+    /// One a column; absent where there is none or it is infinite.
+    pub(crate) values: Vec<Option<f64>>,
+}
+
+/// Lines over a number.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct StudyPlot {
+    pub(crate) title: String,
+    pub(crate) x: StudyAxis,
+    pub(crate) y: StudyAxis,
+    pub(crate) lines: Vec<StudyLine>,
+}
+
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct StudyAxis {
+    pub(crate) title: String,
+    pub(crate) unit: String,
+    pub(crate) is_log: bool,
+}
+
+/// Points are finite, and above 0 where the axis is logarithmic.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct StudyLine {
+    pub(crate) name: String,
+    pub(crate) points: Vec<[f64; 2]>,
 }
 
 /// Something that a reader of the figures should know, in words that say what to do.

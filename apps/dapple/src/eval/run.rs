@@ -12,11 +12,13 @@ use super::figures::FrameError;
 use super::job::{Desk, Job, Outcome, jobs};
 use super::journal::Journal;
 use super::pair::{Start, Starts};
-use super::plan::{Entry, Plan};
+use super::plan::{Entry, Plan, StudyEntry};
 use super::results::{
-    Advice, Case, Failure, JudgeInfo, Machine, Results, RunInfo, SCHEMA, SceneInfo, Truth, TruthFrame, commit,
+    Advice, Case, Failure, JudgeInfo, Machine, Results, RunInfo, SCHEMA, SceneInfo, StudyResult, Truth,
+    TruthFrame, commit,
 };
 use super::stage::Stage;
+use super::study::Subject;
 use super::truth::Cache;
 use super::work::Work;
 use crate::args::EvalArgs;
@@ -80,8 +82,21 @@ pub(super) fn evaluate(plan: &Plan, args: &EvalArgs) -> Result<(Results, Option<
             super::write_tables(&results, run.out)?;
         }
     }
+    for (number, study) in plan.studies.iter().enumerate() {
+        match run.study(study, plan.studies.len() - number - 1).with_context(|| study.kind.clone()) {
+            Ok(found) => results.studies.push(found),
+            Err(error) if plan.entries.is_empty() && plan.studies.len() == 1 => return Err(error),
+            Err(error) => {
+                tracing::error!("{error:#}");
+                let error = format!("{error:#}");
+                results.failures.push(Failure { scene: format!("study {}", study.kind), error });
+            }
+        }
+        results.advice = advise(&results);
+    }
     drop(run.work);
     if results.cases.is_empty()
+        && results.studies.is_empty()
         && let Some(first) = results.failures.first()
     {
         bail!("none of the {} scenes could be evaluated; the first: {}", plan.entries.len(), first.error);
@@ -152,9 +167,79 @@ impl Run<'_> {
                 lpips_weights: self.judge.weights.clone(),
             },
             cases: Vec::new(),
+            studies: Vec::new(),
             failures: Vec::new(),
             advice: Vec::new(),
         }
+    }
+
+    /// What is needed before anything is written.
+    fn open_folder(&mut self) -> Result<()> {
+        std::fs::create_dir_all(self.out)
+            .with_context(|| format!("cannot create the folder {}", self.out.display()))?;
+        if self.lock.is_none() {
+            self.lock = lock(self.out)?;
+        }
+        Ok(())
+    }
+
+    /// One study; `more` are to come.
+    fn study(&mut self, study: &StudyEntry, more: usize) -> Result<StudyResult> {
+        let Some(entry) = &study.entry else {
+            self.open_folder()?;
+            return self.measure(study, None, None, more);
+        };
+        self.work.message(&format!("loading {}", entry.name));
+        let loaded = source::load(&entry.scene, None)?;
+        self.open_folder()?;
+        let radius = source::radius_of(&loaded.scene, entry.settings.radius)?;
+        let path = paths(&loaded, &entry.settings.paths)?.swap_remove(0);
+        let starts = Starts::new(&loaded.scene);
+        let stage = Stage::new(&loaded, &entry.settings, path, radius, starts.tracer().clone());
+        let name = format!("{} / {}", entry.name, stage.path.name);
+        self.measure(study, Some(&stage), Some(name), more)
+    }
+
+    fn measure(
+        &mut self,
+        study: &StudyEntry,
+        stage: Option<&Stage<'_>>,
+        subject: Option<String>,
+        more: usize,
+    ) -> Result<StudyResult> {
+        let what = match &subject {
+            Some(subject) => format!("study {}: {subject}", study.kind),
+            None => format!("study {}", study.kind),
+        };
+        let work = study.study.work(stage);
+        self.work.expect(1, work, more);
+        let key = self.journal.key(json!({
+            "study": format!("{:?}", study.study),
+            "kind": study.kind,
+            "stage": stage.map(|stage| self.identity(stage)),
+            "settings": stage.map(|stage| format!("{:?} {:?}", stage.settings.methods, stage.settings.effort)),
+        }));
+        if let Some(found) = self.journal.get(&key, |_: &StudyResult| Vec::new()) {
+            self.reused += 1;
+            self.work.finish(&what, work, false);
+            return Ok(found);
+        }
+        self.work.begin(&what);
+        let bar = &self.work;
+        let progress = |part: f64| bar.part(work, part);
+        let found = study.study.run(&Subject { stage, cache: &self.cache, progress: &progress })?;
+        let found = StudyResult {
+            kind: study.kind.clone(),
+            title: study.study.title().to_owned(),
+            subject,
+            notes: found.notes,
+            tables: found.tables,
+            plots: found.plots,
+            machine: Machine::here(),
+        };
+        self.journal.put(&key, &found)?;
+        self.work.finish(&what, work, true);
+        Ok(found)
     }
 
     /// All cases of one scene.
@@ -162,11 +247,7 @@ impl Run<'_> {
         self.work.message(&format!("loading {}", entry.name));
         let loaded = source::load(&entry.scene, None)?;
         // Only now, so that a scene that cannot be used leaves nothing behind.
-        std::fs::create_dir_all(self.out)
-            .with_context(|| format!("cannot create the folder {}", self.out.display()))?;
-        if self.lock.is_none() {
-            self.lock = lock(self.out)?;
-        }
+        self.open_folder()?;
         let radius = source::radius_of(&loaded.scene, entry.settings.radius)?;
         let mut starts = Starts::new(&loaded.scene);
         let paths = paths(&loaded, &entry.settings.paths)?;
@@ -316,6 +397,7 @@ impl Run<'_> {
             "adaptive": settings.adaptive,
             "bent_normals": settings.bent_normals,
             "hdr_flip": settings.hdr_flip,
+            "effort": format!("{:?}", settings.effort),
             // Says how long flicker is watched.
             "slowest_hz": settings.slowest_hz(),
             "judge": [json!(self.judge.weights), json!(self.judge.pixels_per_degree)],

@@ -207,7 +207,8 @@ impl<'a> Stage<'a> {
         self.camera(drawn.pose.time)
     }
 
-    fn camera(&self, time_s: f64) -> PosedCamera {
+    /// The path's camera.
+    pub(super) fn camera(&self, time_s: f64) -> PosedCamera {
         let scene = self.scene();
         self.path.camera(scene, &scene.pose_undeformed(time_s))
     }

@@ -1,7 +1,7 @@
 //! Results as tables of text and of Markdown.
 
 use super::columns::{Column, Setting, filled, number, settings};
-use super::results::{Case, Figure, Results, Row};
+use super::results::{Case, Figure, Results, Row, StudyColumn, StudyResult, StudyRow, StudyTable};
 
 /// A row's cells: method, setting, and the columns given; a dash where one does not apply.
 fn cells(row: &Row, setting: &Setting, columns: &[&Column]) -> Vec<String> {
@@ -36,8 +36,14 @@ pub(super) fn text(results: &Results) -> String {
     for case in &results.cases {
         text.push_str(&format!("{}\n", case.name));
         text.push_str(&format!("{}\n", conditions(case)));
-        text.push_str(&aligned(&lines(case)));
+        text.push_str(&aligned(&lines(case), 2));
         text.push('\n');
+    }
+    for study in &results.studies {
+        text.push_str(&format!("{}\n", study_title(study)));
+        for table in &study.tables {
+            text.push_str(&format!("{}\n{}\n", table.title, aligned(&study_lines(table), 1)));
+        }
     }
     for advice in &results.advice {
         text.push_str(&format!("note: {}\n", sentence(results, advice)));
@@ -78,7 +84,32 @@ fn lines(case: &Case) -> Vec<Vec<String>> {
     std::iter::once(titles).chain(rows.map(|(row, setting)| cells(row, &setting, &columns))).collect()
 }
 
-fn aligned(lines: &[Vec<String>]) -> String {
+/// What a study is of, in a line.
+pub(super) fn study_title(study: &StudyResult) -> String {
+    match &study.subject {
+        Some(subject) => format!("{}: {subject}", study.title),
+        None => study.title.clone(),
+    }
+}
+
+/// Titles and cells of a study's table.
+pub(super) fn study_lines(table: &StudyTable) -> Vec<Vec<String>> {
+    let title = |column: &StudyColumn| match column.unit.as_str() {
+        "" => column.title.clone(),
+        unit => format!("{} {unit}", column.title),
+    };
+    let titles = std::iter::once(String::new()).chain(table.columns.iter().map(title)).collect();
+    let cells = |row: &StudyRow| {
+        let values = row.values.iter().zip(&table.columns);
+        let values =
+            values.map(|(value, column)| value.map_or("–".to_owned(), |v| number(v, column.digits)));
+        std::iter::once(row.name.clone()).chain(values).collect()
+    };
+    std::iter::once(titles).chain(table.rows.iter().map(cells)).collect()
+}
+
+/// Columns of text; so many at the left are words.
+fn aligned(lines: &[Vec<String>], words: usize) -> String {
     let columns = lines.first().map_or(0, Vec::len);
     let width = |column: usize| lines.iter().map(|l| l[column].chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns).map(width).collect();
@@ -87,7 +118,7 @@ fn aligned(lines: &[Vec<String>]) -> String {
         for (column, cell) in line.iter().enumerate() {
             let pad = " ".repeat(widths[column] - cell.chars().count());
             // Words left, numbers right.
-            let padded = if column < 2 { format!("{cell}{pad}  ") } else { format!("{pad}{cell}  ") };
+            let padded = if column < words { format!("{cell}{pad}  ") } else { format!("{pad}{cell}  ") };
             text.push_str(&padded);
         }
         text.truncate(text.trim_end().len());
@@ -98,25 +129,39 @@ fn aligned(lines: &[Vec<String>]) -> String {
 
 /// `results.md`: what to paste into an issue or a paper's notes.
 pub(super) fn markdown(results: &Results) -> String {
-    let escape = |cell: &str| cell.replace('|', "\\|");
     let mut text = format!("# {}\n\n`{}`\n", results.title, results.run.command);
     for case in &results.cases {
         text.push_str(&format!("\n## {}\n\n{}\n\n", case.name, conditions(case)));
-        for (number, line) in lines(case).iter().enumerate() {
-            text.push_str(&format!(
-                "| {} |\n",
-                line.iter().map(|c| escape(c)).collect::<Vec<_>>().join(" | ")
-            ));
-            if number == 0 {
-                let rules = (0..line.len()).map(|c| if c < 2 { "---" } else { "---:" }).collect::<Vec<_>>();
-                text.push_str(&format!("| {} |\n", rules.join(" | ")));
-            }
+        text.push_str(&markdown_table(&lines(case), 2));
+    }
+    for study in &results.studies {
+        text.push_str(&format!("\n## {}\n", study_title(study)));
+        for note in &study.notes {
+            text.push_str(&format!("\n{note}\n"));
+        }
+        for table in &study.tables {
+            text.push_str(&format!("\n### {}\n\n{}", table.title, markdown_table(&study_lines(table), 1)));
         }
     }
     if !results.advice.is_empty() {
         text.push_str("\n## Notes\n\n");
         for advice in &results.advice {
             text.push_str(&format!("- {}\n", sentence(results, advice)));
+        }
+    }
+    text
+}
+
+/// A table whose first columns are words.
+fn markdown_table(lines: &[Vec<String>], words: usize) -> String {
+    let mut text = String::new();
+    for (number, line) in lines.iter().enumerate() {
+        let cells: Vec<String> = line.iter().map(|cell| cell.replace('|', "\\|")).collect();
+        text.push_str(&format!("| {} |\n", cells.join(" | ")));
+        if number == 0 {
+            let rules: Vec<&str> =
+                (0..line.len()).map(|column| if column < words { "---" } else { "---:" }).collect();
+            text.push_str(&format!("| {} |\n", rules.join(" | ")));
         }
     }
     text

@@ -5,11 +5,11 @@
 #[cfg(test)]
 mod tests;
 
-use crate::RenderError;
 use crate::bilateral::Bilateral;
 use crate::gbuffer::Screen;
 use crate::noise::alchemy_turn;
 use crate::obscurance::Obscurance;
+use crate::{AfterPass, RenderError};
 
 /// Most places that are looked at around a sample.
 pub const MAX_SAMPLES: u32 = 256;
@@ -94,30 +94,68 @@ impl AlchemyParams {
 /// # Errors
 /// A parameter out of its range.
 pub fn estimate_visibility(screen: &Screen, params: &AlchemyParams) -> Result<Vec<f32>, RenderError> {
-    params.check()?;
-    let estimator = params.estimator();
-    let spiral = estimator.spiral();
-    let visibility = screen.map(|at| visibility_at(screen, params.radius_m, &estimator, &spiral, at));
-    Ok(Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility))
+    estimate_by_passes(screen, params, &mut |_| ())
 }
 
-fn visibility_at(
+/// As [`estimate_visibility`], and tells when each pass is done: `samples`, `blur`.
+///
+/// # Errors
+/// As there.
+pub fn estimate_by_passes(
     screen: &Screen,
+    params: &AlchemyParams,
+    after: AfterPass<'_>,
+) -> Result<Vec<f32>, RenderError> {
+    params.check()?;
+    let sampler = Sampler::new(screen, params);
+    let visibility = screen.map(|at| sampler.visibility_at(at, &mut |_, _| ()));
+    after("samples");
+    let visibility = Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility);
+    after("blur");
+    Ok(visibility)
+}
+
+/// The sampling pass of a picture, sample by sample.
+pub struct Sampler<'a> {
+    screen: &'a Screen,
     radius_m: f32,
-    estimator: &Obscurance,
-    spiral: &[(f32, f32)],
-    at: [usize; 2],
-) -> f32 {
-    let Some(place) = screen.position_at(at) else { return 1.0 };
-    let normal = screen.normals_view()[at[1] * screen.columns() as usize + at[0]];
-    let radius = radius_m * screen.samples_per_metre(-place.z);
-    let turn = alchemy_turn(at);
-    let mut sum = 0.0;
-    for (part, angle) in spiral {
-        let (sin, cos) = libm::sincosf(angle + turn);
-        let seen = screen.neighbour(at, [radius * part * cos, radius * part * sin]);
-        let Some(seen) = seen.and_then(|seen| screen.position_at(seen)) else { continue };
-        sum += estimator.term(seen - place, normal, -place.z);
+    estimator: Obscurance,
+    /// Of each place the part of the radius, and the angle.
+    spiral: Vec<(f32, f32)>,
+}
+
+impl<'a> Sampler<'a> {
+    /// The parameters must have passed [`AlchemyParams::check`].
+    pub fn new(screen: &'a Screen, params: &AlchemyParams) -> Sampler<'a> {
+        let estimator = params.estimator();
+        let spiral = estimator.spiral();
+        Sampler { screen, radius_m: params.radius_m, estimator, spiral }
     }
-    estimator.visibility(sum)
+
+    /// What the sample in a column and row reads, in its order: the number of the read (0: its own position and its normal; then the positions of the places, of which
+    /// those outside of the picture are not read), and column and row.
+    pub fn visit_reads(&self, at: [usize; 2], visit: &mut impl FnMut(usize, [usize; 2])) {
+        self.visibility_at(at, visit);
+    }
+
+    /// A visitor that does nothing costs nothing.
+    fn visibility_at(&self, at: [usize; 2], visit: &mut impl FnMut(usize, [usize; 2])) -> f32 {
+        let screen = self.screen;
+        visit(0, at);
+        let Some(place) = screen.position_at(at) else { return 1.0 };
+        let normal = screen.normals_view()[at[1] * screen.columns() as usize + at[0]];
+        let radius = self.radius_m * screen.samples_per_metre(-place.z);
+        let turn = alchemy_turn(at);
+        let mut sum = 0.0;
+        for (number, (part, angle)) in self.spiral.iter().enumerate() {
+            let (sin, cos) = libm::sincosf(angle + turn);
+            let Some(seen) = screen.neighbour(at, [radius * part * cos, radius * part * sin]) else {
+                continue;
+            };
+            visit(number + 1, seen);
+            let Some(seen) = screen.position_at(seen) else { continue };
+            sum += self.estimator.term(seen - place, normal, -place.z);
+        }
+        self.estimator.visibility(sum)
+    }
 }

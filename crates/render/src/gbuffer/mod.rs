@@ -3,6 +3,7 @@
 //! Takes a scene, its pose and a camera; returns for each sample which triangle is seen, where in it, and how deep.
 //! See the README in this folder for rules and precision.
 
+mod guard;
 mod pick;
 mod raster;
 mod screen;
@@ -15,6 +16,7 @@ use glam::{DVec2, DVec4, Vec4};
 use rayon::prelude::*;
 
 use crate::{RenderError, projection, texture};
+pub use guard::GuardBand;
 pub use pick::surface_at;
 pub(crate) use raster::{Sink, Triangle, View, barycentrics, draw};
 pub use screen::Screen;

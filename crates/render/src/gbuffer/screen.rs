@@ -4,7 +4,7 @@ use dapple_scene::{Pose, PosedCamera, Projection, Scene};
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 
-use super::GBuffer;
+use super::{GBuffer, Sample};
 use crate::{RenderError, projection};
 
 /// Distance and normal of every sample, and the lens that brings samples back to places. View space: right-handed, x right,
@@ -13,6 +13,10 @@ use crate::{RenderError, projection};
 pub struct Screen {
     columns: u32,
     rows: u32,
+    /// The picture's width and height in samples: less than columns and rows where the last ones reach beyond it.
+    span: [f32; 2],
+    /// The point of the picture that each sample is of; empty where that is the middle of its square.
+    centres: Vec<[f32; 2]>,
     lens: Lens,
     distances_m: Vec<f32>,
     normals_view: Vec<Vec3>,
@@ -27,6 +31,16 @@ struct Lens {
 }
 
 impl GBuffer {
+    /// Distance of each sample along the view axis, metres, row-major from the top; infinite for the background. What a method that needs no normals is given:
+    /// \[McGuire2012\] eq. 2. `camera` must be the one that was drawn.
+    pub fn distances_m(&self, camera: &PosedCamera) -> Vec<f32> {
+        let distance = |sample: &Sample| match sample.is_covered() {
+            true => projection::view_distance(&camera.projection, sample.depth),
+            false => f32::INFINITY,
+        };
+        self.samples.par_iter().with_min_len(1024).map(distance).collect()
+    }
+
     /// Distances and normals for screen-space methods. `scene`, `pose` and `camera` must be those that were drawn.
     ///
     /// Normals are those of the posed triangles, as the ray-traced truth uses them, not interpolated or mapped ones.
@@ -52,6 +66,8 @@ impl GBuffer {
         Ok(Screen {
             columns: self.width_samples(),
             rows: self.height_samples(),
+            span: [self.width_samples() as f32, self.height_samples() as f32],
+            centres: Vec::new(),
             lens,
             distances_m,
             normals_view,
@@ -97,14 +113,24 @@ impl Screen {
         if !distance.is_finite() {
             return None;
         }
-        let (column, row) = (sample_index % self.columns as usize, sample_index / self.columns as usize);
-        Some(self.place_view(column as f32 + 0.5, row as f32 + 0.5, distance))
+        let [column, row] =
+            self.centre([sample_index % self.columns as usize, sample_index / self.columns as usize]);
+        Some(self.place_view(column, row, distance))
+    }
+
+    /// The point of the picture that the sample in a column and row is of, as of [`Screen::place_view`]: the middle of its square, but not in a
+    /// [`Screen::half`]. The sample must be in the picture.
+    pub fn centre(&self, [column, row]: [usize; 2]) -> [f32; 2] {
+        match self.centres.is_empty() {
+            true => [column as f32 + 0.5, row as f32 + 0.5],
+            false => self.centres[row * self.columns as usize + column],
+        }
     }
 
     /// The place at a distance that a point of the picture shows. Coordinates count samples: the first one's centre is at (0.5, 0.5).
     pub fn place_view(&self, column: f32, row: f32, distance_m: f32) -> Vec3 {
-        let x = 2.0 * column / self.columns as f32 - 1.0;
-        let y = 1.0 - 2.0 * row / self.rows as f32;
+        let x = 2.0 * column / self.span[0] - 1.0;
+        let y = 1.0 - 2.0 * row / self.span[1];
         let scale = if self.lens.is_perspective { distance_m } else { 1.0 };
         let [half_width, half_height] = self.lens.half_extent;
         Vec3::new(x * half_width * scale, y * half_height * scale, -distance_m)
@@ -135,11 +161,38 @@ impl Screen {
         values
     }
 
+    /// A screen of a quarter of the samples: of each square of 2 × 2 one, another in each row and column (\[McGuire2012\] Table 1, rotated grid). Distances,
+    /// normals and places are true ones; [`Screen::centre`] says where in its square a sample lies.
+    pub fn half(&self) -> Screen {
+        let (columns, rows) = (self.columns.div_ceil(2), self.rows.div_ceil(2));
+        let sources: Vec<usize> = (0..rows as usize * columns as usize)
+            .map(|i| {
+                let (x, y) = (i % columns as usize, i / columns as usize);
+                let column = (2 * x + (y & 1 ^ 1)).min(self.columns as usize - 1);
+                let row = (2 * y + (x & 1 ^ 1)).min(self.rows as usize - 1);
+                row * self.columns as usize + column
+            })
+            .collect();
+        let centre = |&i: &usize| {
+            self.centre([i % self.columns as usize, i / self.columns as usize]).map(|at| 0.5 * at)
+        };
+        Screen {
+            columns,
+            rows,
+            span: self.span.map(|side| 0.5 * side),
+            centres: sources.iter().map(centre).collect(),
+            lens: self.lens,
+            distances_m: sources.iter().map(|&i| self.distances_m[i]).collect(),
+            normals_view: sources.iter().map(|&i| self.normals_view[i]).collect(),
+        }
+    }
+
     /// The sample that lies so many to the right and down of another's centre; `None` outside of the picture.
-    pub fn neighbour(&self, [column, row]: [usize; 2], by: [f32; 2]) -> Option<[usize; 2]> {
-        let (column, row) = (column as f32 + 0.5 + by[0], row as f32 + 0.5 + by[1]);
+    pub fn neighbour(&self, at: [usize; 2], by: [f32; 2]) -> Option<[usize; 2]> {
+        let [column, row] = self.centre(at);
+        let (column, row) = (column + by[0], row + by[1]);
         // Not a number is outside, too.
-        let inside = column >= 0.0 && column < self.columns as f32 && row >= 0.0 && row < self.rows as f32;
+        let inside = column >= 0.0 && column < self.span[0] && row >= 0.0 && row < self.span[1];
         inside.then_some([column as usize, row as usize])
     }
 
@@ -155,7 +208,7 @@ impl Screen {
 
     /// How many samples of the picture a metre across the view axis is long at a distance. Samples are taken to be square.
     pub fn samples_per_metre(&self, distance_m: f32) -> f32 {
-        let at_one = 0.5 * self.rows as f32 / self.lens.half_extent[1];
+        let at_one = 0.5 * self.span[1] / self.lens.half_extent[1];
         if self.lens.is_perspective { at_one / distance_m } else { at_one }
     }
 
@@ -168,10 +221,10 @@ impl Screen {
             false => 1.0,
         };
         let [half_width, half_height] = self.lens.half_extent;
-        let column = (0.5 + 0.5 * position_view.x * scale / half_width) * self.columns as f32;
-        let row = (0.5 - 0.5 * position_view.y * scale / half_height) * self.rows as f32;
+        let column = (0.5 + 0.5 * position_view.x * scale / half_width) * self.span[0];
+        let row = (0.5 - 0.5 * position_view.y * scale / half_height) * self.span[1];
         // Not a number is outside, too.
-        let inside = column >= 0.0 && column < self.columns as f32 && row >= 0.0 && row < self.rows as f32;
+        let inside = column >= 0.0 && column < self.span[0] && row >= 0.0 && row < self.span[1];
         inside.then(|| row as usize * self.columns as usize + column as usize)
     }
 }
@@ -210,6 +263,51 @@ mod tests {
             ] {
                 assert_eq!(at(outside), None, "{outside:?}");
             }
+        }
+    }
+
+    #[test]
+    fn distances_alone_are_those_of_the_screen() {
+        for projection in [
+            Projection::Perspective { yfov: 0.8, near: 0.02 },
+            Projection::Orthographic { half_height: 2.0, near: -3.0, far: 20.0 },
+        ] {
+            let camera = PosedCamera { projection, ..look(Vec3::new(1.5, 2.0, 3.0), Vec3::ZERO) };
+            let (gbuffer, screen) = draw(&still_life(), &camera, [61, 37]);
+            assert_eq!(gbuffer.distances_m(&camera), screen.distances_m());
+        }
+    }
+
+    #[test]
+    fn halves_have_true_samples_at_their_true_places() {
+        for screen in screens() {
+            for (half, factor) in [(screen.half(), 2.0), (screen.half().half(), 4.0)] {
+                assert_eq!(
+                    [half.columns(), half.rows()],
+                    [61, 37].map(|side: u32| side.div_ceil(factor as u32))
+                );
+                for i in 0..half.distances_m().len() {
+                    let at = [i % half.columns() as usize, i / half.columns() as usize];
+                    let full = half.centre(at).map(|c| (c * factor) as usize);
+                    let source = full[1] * 61 + full[0];
+                    assert_eq!(half.distances_m()[i], screen.distances_m()[source]);
+                    assert_eq!(half.normals_view()[i], screen.normals_view()[source]);
+                    let (Some(a), Some(b)) = (half.position_view(i), screen.position_view(source)) else {
+                        continue;
+                    };
+                    assert!(a.distance(b) < 1e-5 * (1.0 + b.length()), "{a}, {b}");
+                    // It is the one that its own place falls on, and no step leads back to itself.
+                    assert_eq!(half.sample_at(a), Some(i));
+                    assert_eq!(half.neighbour(at, [0.0, 0.0]), Some(at));
+                    let scale = screen.samples_per_metre(-b.z) / half.samples_per_metre(-a.z);
+                    assert!((scale - factor).abs() < 1e-4);
+                }
+            }
+            // Of any two rows and columns of the picture both are there.
+            let half = screen.half();
+            let parts: Vec<[u32; 2]> =
+                [[0, 0], [1, 0], [0, 1], [1, 1]].map(|at| half.centre(at).map(|c| (2.0 * c) as u32)).to_vec();
+            assert_eq!(parts, [[1, 1], [3, 0], [0, 3], [2, 2]]);
         }
     }
 

@@ -7,10 +7,10 @@ mod tests;
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use crate::RenderError;
 use crate::bilateral::Bilateral;
 use crate::gbuffer::Screen;
 use crate::noise::interleaved_gradient;
+use crate::{AfterPass, RenderError};
 use glam::Vec3;
 
 /// Most slices, and most steps along each half of one.
@@ -72,9 +72,24 @@ impl GtaoParams {
 /// # Errors
 /// A parameter out of its range.
 pub fn estimate_visibility(screen: &Screen, params: &GtaoParams) -> Result<Vec<f32>, RenderError> {
+    estimate_by_passes(screen, params, &mut |_| ())
+}
+
+/// As [`estimate_visibility`], and tells when each pass is done: `samples`, `blur`.
+///
+/// # Errors
+/// As there.
+pub fn estimate_by_passes(
+    screen: &Screen,
+    params: &GtaoParams,
+    after: AfterPass<'_>,
+) -> Result<Vec<f32>, RenderError> {
     params.check()?;
     let visibility = screen.map(|at| visibility_at(screen, params, at));
-    Ok(Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility))
+    after("samples");
+    let visibility = Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility);
+    after("blur");
+    Ok(visibility)
 }
 
 fn visibility_at(screen: &Screen, params: &GtaoParams, at: [usize; 2]) -> f32 {

@@ -5,10 +5,10 @@
 #[cfg(test)]
 mod tests;
 
-use crate::RenderError;
 use crate::bilateral::Bilateral;
 use crate::gbuffer::Screen;
 use crate::noise::interleaved_gradient;
+use crate::{AfterPass, RenderError};
 use glam::Vec3;
 
 /// Most directions, and most steps along each.
@@ -92,10 +92,25 @@ impl HbaoParams {
 /// # Errors
 /// A parameter out of its range.
 pub fn estimate_visibility(screen: &Screen, params: &HbaoParams) -> Result<Vec<f32>, RenderError> {
+    estimate_by_passes(screen, params, &mut |_| ())
+}
+
+/// As [`estimate_visibility`], and tells when each pass is done: `samples`, `blur`.
+///
+/// # Errors
+/// As there.
+pub fn estimate_by_passes(
+    screen: &Screen,
+    params: &HbaoParams,
+    after: AfterPass<'_>,
+) -> Result<Vec<f32>, RenderError> {
     params.check()?;
     let visibility =
         screen.map(|at| 1.0 - (params.strength * occlusion_at(screen, params, at)).clamp(0.0, 1.0));
-    Ok(Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility))
+    after("samples");
+    let visibility = Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility);
+    after("blur");
+    Ok(visibility)
 }
 
 fn occlusion_at(screen: &Screen, params: &HbaoParams, at: [usize; 2]) -> f32 {
@@ -123,8 +138,8 @@ fn occlusion_at(screen: &Screen, params: &HbaoParams, at: [usize; 2]) -> f32 {
         sum += match params.horizon {
             Horizon::Highest => {
                 // Where the plane of the surface goes in that direction of the picture.
-                let (column, row) = (at[0] as f32 + 0.5 + cos, at[1] as f32 + 0.5 + sin);
-                let along = screen.on_plane(column, row, place, normal).map(|next| next - place);
+                let [column, row] = screen.centre(at);
+                let along = screen.on_plane(column + cos, row + sin, place, normal).map(|next| next - place);
                 // Samples lie beside the direction by up to half of one each way: the plane must not rise over itself for that.
                 let steps =
                     steps.filter(|(to_seen, _)| normal.dot(*to_seen) > libm::sinf(bias) * to_seen.length());

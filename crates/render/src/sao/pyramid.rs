@@ -71,13 +71,14 @@ impl Pyramid {
 
     /// The distance at the texel of a level that a sample of the picture lies in, metres, and the point of the picture that it stands for, as of
     /// [`Screen::place_view`]: with the rotated grid the centre of the sample that it is of, else that of the texel's samples. The sample must be in the picture.
-    pub(super) fn read(&self, level: usize, [column, row]: [usize; 2]) -> (f32, [f32; 2]) {
+    pub(super) fn read(&self, screen: &Screen, level: usize, [column, row]: [usize; 2]) -> (f32, [f32; 2]) {
         let Level { columns, rows, distances_m } = &self.levels[level];
         let texel = [column >> level, row >> level];
         debug_assert!(texel[0] < *columns && texel[1] < *rows);
         let distance = distances_m[texel[1] * columns + texel[0]];
         let stands_for = match self.filter {
-            MipFilter::RotatedGrid => self.source(level, texel).map(|at| at as f32 + 0.5),
+            MipFilter::RotatedGrid => screen.centre(self.source(level, texel)),
+            _ if level == 0 => screen.centre(texel),
             _ => {
                 let first = &self.levels[0];
                 let centre = |texel: usize, count: usize| {

@@ -14,37 +14,60 @@ const QUAD_EDGE_M: f32 = 0.02;
 /// Visibility by eq. 1 of each sample, row-major from the top, noisy: 0 … 1, and 1 for the background. The parameters must have passed
 /// [`SaoParams::check`], the pyramid be that of the picture.
 pub fn sample_obscurance(screen: &Screen, pyramid: &Pyramid, params: &SaoParams) -> Vec<f32> {
-    let estimator = params.estimator();
-    let spiral = estimator.spiral();
-    screen.map(|at| visibility_at(screen, pyramid, params, &estimator, &spiral, at))
+    let sampler = Sampler::new(screen, pyramid, params);
+    screen.map(|at| sampler.visibility_at(at, &mut |_, _, _| ()))
 }
 
-fn visibility_at(
-    screen: &Screen,
-    pyramid: &Pyramid,
-    params: &SaoParams,
-    estimator: &Obscurance,
-    spiral: &[(f32, f32)],
-    at: [usize; 2],
-) -> f32 {
-    let Some(place) = screen.position_at(at) else { return 1.0 };
-    let normal = normal_view(screen, at);
-    let radius = params.radius_m * screen.samples_per_metre(-place.z);
-    let turn = alchemy_turn(at);
-    let top = pyramid.levels() - 1;
-    let mut sum = 0.0;
-    for (part, angle) in spiral {
-        let length = radius * part;
-        let (sin, cos) = libm::sincosf(angle + turn);
-        let Some(seen) = screen.neighbour(at, [length * cos, length * sin]) else { continue };
-        // Eq. 9: the higher the farther it is on the screen.
-        let level = (length as u32).checked_ilog2().unwrap_or(0).saturating_sub(params.switch_log2);
-        let (seen_m, [column, row]) = pyramid.read((level as usize).min(top), seen);
-        if seen_m.is_finite() {
-            sum += estimator.term(screen.place_view(column, row, seen_m) - place, normal, -place.z);
-        }
+/// The sampling pass of a picture, sample by sample.
+pub struct Sampler<'a> {
+    screen: &'a Screen,
+    pyramid: &'a Pyramid,
+    params: &'a SaoParams,
+    estimator: Obscurance,
+    /// Of each place the part of the radius, and the angle.
+    spiral: Vec<(f32, f32)>,
+}
+
+impl<'a> Sampler<'a> {
+    /// The parameters must have passed [`SaoParams::check`], the pyramid be that of the picture.
+    pub fn new(screen: &'a Screen, pyramid: &'a Pyramid, params: &'a SaoParams) -> Sampler<'a> {
+        let estimator = params.estimator();
+        let spiral = estimator.spiral();
+        Sampler { screen, pyramid, params, estimator, spiral }
     }
-    estimator.visibility(sum)
+
+    /// What the sample in a column and row reads, in its order: the number of the read (0: its own distance; then the places, of which those outside of the picture
+    /// are not read), the level, and column and row there. What its quad shares is not read again.
+    pub fn visit_reads(&self, at: [usize; 2], visit: &mut impl FnMut(usize, usize, [usize; 2])) {
+        self.visibility_at(at, visit);
+    }
+
+    /// Eq. 1. A visitor that does nothing costs nothing.
+    fn visibility_at(&self, at: [usize; 2], visit: &mut impl FnMut(usize, usize, [usize; 2])) -> f32 {
+        let (screen, pyramid, params) = (self.screen, self.pyramid, self.params);
+        visit(0, 0, at);
+        let Some(place) = screen.position_at(at) else { return 1.0 };
+        let normal = normal_view(screen, at);
+        let radius = params.radius_m * screen.samples_per_metre(-place.z);
+        let turn = alchemy_turn(at);
+        let top = pyramid.levels() - 1;
+        let mut sum = 0.0;
+        for (number, (part, angle)) in self.spiral.iter().enumerate() {
+            let length = radius * part;
+            let (sin, cos) = libm::sincosf(angle + turn);
+            let Some(seen) = screen.neighbour(at, [length * cos, length * sin]) else { continue };
+            // Eq. 9: the higher the farther it is on the screen.
+            let level = (length as u32).checked_ilog2().unwrap_or(0).saturating_sub(params.switch_log2);
+            let level = (level as usize).min(top);
+            visit(number + 1, level, seen.map(|at| at >> level));
+            let (seen_m, [column, row]) = pyramid.read(screen, level, seen);
+            if seen_m.is_finite() {
+                let seen = screen.place_view(column, row, seen_m);
+                sum += self.estimator.term(seen - place, normal, -place.z);
+            }
+        }
+        self.estimator.visibility(sum)
+    }
 }
 
 /// Eq. 4: the face's normal, from the places that a sample's quad of 2 × 2 shows. Towards the eye. A picture of one row or column, and an edge of the background, leave

@@ -58,8 +58,8 @@ fn levels_of_a_pyramid_are_their_filters() {
         let pyramid = Pyramid::new(&screen, filter, 12);
         assert_eq!(pyramid.levels(), 7, "37, 19, 10, 5, 3, 2 and 1 columns");
         for (x, y) in (0..37).flat_map(|x| (0..22).map(move |y| (x, y))) {
-            assert_eq!(pyramid.read(0, [x, y]), (at(x, y), [x as f32 + 0.5, y as f32 + 0.5]));
-            let (found, _) = pyramid.read(1, [x, y]);
+            assert_eq!(pyramid.read(&screen, 0, [x, y]), (at(x, y), [x as f32 + 0.5, y as f32 + 0.5]));
+            let (found, _) = pyramid.read(&screen, 1, [x, y]);
             let (cx, cy) = (x / 2, y / 2);
             let four = [
                 at(2 * cx, 2 * cy),
@@ -76,7 +76,7 @@ fn levels_of_a_pyramid_are_their_filters() {
             };
             assert!(found == expected || (found - expected).abs() < 1e-5, "{filter:?} at {x}, {y}: {found}");
             for level in 0..7 {
-                let (found, [column, row]) = pyramid.read(level, [x, y]);
+                let (found, [column, row]) = pyramid.read(&screen, level, [x, y]);
                 let [column, row] = [column, row].map(|at| at as usize);
                 if filter == MipFilter::RotatedGrid {
                     // Values of the picture, each with the sample that it is of, in the texel's square or at the border.

@@ -10,8 +10,8 @@ mod tests;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::RenderError;
 use crate::gbuffer::Screen;
+use crate::{AfterPass, RenderError};
 use pattern::Pattern;
 
 /// Most places that are looked at around a sample.
@@ -71,6 +71,18 @@ impl SsaoParams {
 /// # Errors
 /// A parameter out of its range.
 pub fn estimate_visibility(screen: &Screen, params: &SsaoParams) -> Result<Vec<f32>, RenderError> {
+    estimate_by_passes(screen, params, &mut |_| ())
+}
+
+/// As [`estimate_visibility`], and tells when each pass is done: `samples`, `blur`.
+///
+/// # Errors
+/// As there.
+pub fn estimate_by_passes(
+    screen: &Screen,
+    params: &SsaoParams,
+    after: AfterPass<'_>,
+) -> Result<Vec<f32>, RenderError> {
     params.check()?;
     let pattern = Pattern::new(params.samples, params.seed);
     let columns = screen.columns() as usize;
@@ -78,11 +90,13 @@ pub fn estimate_visibility(screen: &Screen, params: &SsaoParams) -> Result<Vec<f
         let turn = pattern.turn(column, row);
         occlusion_at(screen, row * columns + column, &pattern.offsets, turn, params)
     });
+    after("samples");
     // Blurred as occlusion, so that what is open stays exactly 1.
     let mut visibility = blur::blur(&occlusion, columns, params.blur_width, params.blur_sigma);
     visibility.par_iter_mut().zip(screen.distances_m()).with_min_len(1024).for_each(|(value, distance)| {
         *value = if distance.is_finite() { 1.0 - value.clamp(0.0, 1.0) } else { 1.0 };
     });
+    after("blur");
     Ok(visibility)
 }
 

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
+use super::study::Study;
 use crate::args::{Options, SceneChoice, ScenesArgs};
 
 pub(super) use settings::{CLIENT_HZ, Settings};
@@ -20,6 +21,17 @@ const DEFAULT_DETAIL: f32 = 0.15;
 pub(super) struct Plan {
     pub(super) title: String,
     pub(super) entries: Vec<Entry>,
+    pub(super) studies: Vec<StudyEntry>,
+}
+
+/// One study, and what it looks at.
+#[derive(Debug)]
+pub(super) struct StudyEntry {
+    /// As the suite names it.
+    pub(super) kind: String,
+    pub(super) study: Box<dyn Study>,
+    /// The scene and the settings; none for a study without.
+    pub(super) entry: Option<Entry>,
 }
 
 /// One scene, along one or several of its paths.
@@ -37,7 +49,8 @@ impl Plan {
             Some(suite) => suite::read(suite, scenes.scenes_folder.as_deref(), flags)?,
             None => from_flags(scenes, flags)?,
         };
-        for entry in &plan.entries {
+        let of_studies = plan.studies.iter().filter_map(|study| study.entry.as_ref());
+        for entry in plan.entries.iter().chain(of_studies) {
             if let Some(path) = &entry.scene.scene {
                 // A typing mistake must not show after hours.
                 std::fs::File::open(path)
@@ -63,7 +76,7 @@ fn from_flags(args: &ScenesArgs, flags: &Options) -> Result<Plan> {
     }
     let mut names: Vec<&str> = entries.iter().map(|e| e.name.as_str()).collect();
     names.dedup();
-    Ok(Plan { title: names.join(", "), entries })
+    Ok(Plan { title: names.join(", "), entries, studies: Vec::new() })
 }
 
 /// A scene as it is named.

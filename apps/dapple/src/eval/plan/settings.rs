@@ -1,8 +1,10 @@
 //! The settings of one scene, with every default filled in.
 
 use anyhow::{Result, bail};
+use dapple_render::gbuffer::GuardBand;
 
 use crate::args::{Method, Options, Preset, Radius, Size, StepArgs};
+use crate::screen_space::Effort;
 
 /// Frame times lie on a grid of this rate, whatever the server's rate.
 pub(in crate::eval) const CLIENT_HZ: f64 = 60.0;
@@ -32,12 +34,14 @@ pub(in crate::eval) struct Settings {
     /// Whether ambient light in the truth's pictures comes from the directions that are open.
     pub(in crate::eval) gather_ambient: bool,
     pub(in crate::eval) step: StepArgs,
+    /// Of screen-space methods.
+    pub(in crate::eval) effort: Effort,
     pub(in crate::eval) hdr_flip: bool,
 }
 
 impl Settings {
     /// `small` is the built-in setting, which takes less than a minute.
-    pub(super) fn new(options: &Options, small: bool) -> Result<Settings> {
+    pub(in crate::eval) fn new(options: &Options, small: bool) -> Result<Settings> {
         let options = options.clone();
         let supersample = options.supersample.unwrap_or(2);
         // Zero is refused below.
@@ -50,6 +54,7 @@ impl Settings {
             Method::None,
         ];
         let preset = options.preset;
+        let effort = options.effort();
         let points = preset.map_or(if small { 256.0 } else { 512.0 }, Preset::points_per_m2);
         let settings = Settings {
             methods: distinct(options.methods.unwrap_or(default_methods)),
@@ -74,6 +79,7 @@ impl Settings {
                 budget: options.budget.or(preset.map(Preset::budget)),
                 max_points: options.max_points,
             },
+            effort,
             hdr_flip: options.hdr_flip.unwrap_or(false),
         };
         settings.check()?;
@@ -98,6 +104,9 @@ impl Settings {
         }
         if !(0.0..=1.0).contains(&self.adaptive) {
             bail!("--adaptive is {}, must be 0 to 1", self.adaptive);
+        }
+        if !(0.0..=GuardBand::MAX_PART).contains(&self.effort.guard_band) {
+            bail!("--guard-band is {}, must be 0 to {}", self.effort.guard_band, GuardBand::MAX_PART);
         }
         if !(1..=65536).contains(&self.reference_rays) {
             bail!("--reference-rays is {}, must be 1 to 65536", self.reference_rays);

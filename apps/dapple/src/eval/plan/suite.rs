@@ -5,7 +5,8 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 
-use super::{Plan, Which, below, entry};
+use super::super::study;
+use super::{Plan, StudyEntry, Which, below, entry};
 use crate::args::Options;
 use crate::source::read_limited;
 
@@ -13,7 +14,7 @@ use crate::source::read_limited;
 const MAX_BYTES: u64 = 1 << 20;
 
 /// Suites that the program brings, by name.
-const BUILTIN: [(&str, &str, &str); 3] = [
+const BUILTIN: [(&str, &str, &str); 5] = [
     (
         "builtins",
         include_str!("../../../suites/builtins.toml"),
@@ -29,6 +30,16 @@ const BUILTIN: [(&str, &str, &str); 3] = [
         include_str!("../../../suites/psao.toml"),
         "points, the paper's scheme and shading atlas streaming on three scenes",
     ),
+    (
+        "sao",
+        include_str!("../../../suites/sao.toml"),
+        "screen-space methods on three built-in scenes, with the studies of SAO",
+    ),
+    (
+        "sao-others",
+        include_str!("../../../suites/sao-others.toml"),
+        "the same on scenes by others, found with --scenes-folder",
+    ),
 ];
 
 /// A suite as its file says it.
@@ -41,6 +52,8 @@ struct Suite {
     defaults: Options,
     #[serde(rename = "case", default)]
     cases: Vec<toml::Table>,
+    #[serde(rename = "study", default)]
+    studies: Vec<toml::Table>,
 }
 
 /// Reads a built-in suite or a file.
@@ -66,8 +79,10 @@ pub(super) fn read(wanted: &str, scenes_folder: Option<&Path>, flags: &Options) 
 
 fn plan(text: &str, folder: &Path, flags: &Options) -> Result<Plan> {
     let suite: Suite = toml::from_str(text)?;
-    if suite.cases.is_empty() {
-        bail!("it has no [[case]]: add at least one, with scene = \"FILE\" or builtin = \"NAME\"");
+    if suite.cases.is_empty() && suite.studies.is_empty() {
+        bail!(
+            "it has no [[case]]: add at least one, with scene = \"FILE\" or builtin = \"NAME\", or a [[study]]"
+        );
     }
     let mut entries = Vec::new();
     for (number, mut table) in suite.cases.into_iter().enumerate() {
@@ -81,7 +96,35 @@ fn plan(text: &str, folder: &Path, flags: &Options) -> Result<Plan> {
         let options = flags.clone().or(&own).or(&suite.defaults);
         entries.push(entry(which, &options, false).with_context(|| format!("[[case]] {}", number + 1))?);
     }
-    Ok(Plan { title: suite.title.unwrap_or_else(|| "Evaluation".to_owned()), entries })
+    let mut studies = Vec::new();
+    for (number, table) in suite.studies.into_iter().enumerate() {
+        let entry = study(table, folder, flags, &suite.defaults);
+        studies.push(entry.with_context(|| format!("[[study]] {}", number + 1))?);
+    }
+    Ok(Plan { title: suite.title.unwrap_or_else(|| "Evaluation".to_owned()), entries, studies })
+}
+
+/// Reads a `[[study]]`: its kind, the kind's own settings, a scene if it needs one, and settings as of a case.
+fn study(mut table: toml::Table, folder: &Path, flags: &Options, defaults: &Options) -> Result<StudyEntry> {
+    let Some(toml::Value::String(kind)) = table.remove("kind") else {
+        bail!("it must have kind = \"NAME\"");
+    };
+    if flags.size.is_some() {
+        // Said for all.
+        table.remove("sizes");
+    }
+    let study = study::read(&kind, &mut table).with_context(|| kind.clone())?;
+    if !study.has_scene() {
+        if let Some(key) = table.keys().next() {
+            bail!("{kind} has no setting {key}, nor a scene");
+        }
+        return Ok(StudyEntry { kind, study, entry: None });
+    }
+    let which = which(&mut table, folder)?;
+    let own = Options::deserialize(table)
+        .context("it may have kind, the kind's own settings, scene or builtin, and settings of cases")?;
+    let entry = entry(which, &flags.clone().or(&own).or(defaults), false)?;
+    Ok(StudyEntry { kind, study, entry: Some(entry) })
 }
 
 /// Takes the scene out of a case.
@@ -104,7 +147,8 @@ mod tests {
         let flags = Options { methods: Some(vec![Method::Psao]), ..Options::default() };
         for (name, text, _) in BUILTIN {
             let plan = plan(text, Path::new("somewhere"), &flags);
-            assert!(plan.is_ok_and(|p| p.entries.len() > 1), "{name}");
+            let plan = plan.unwrap_or_else(|error| panic!("{name}: {error:#}"));
+            assert!(plan.entries.len() > 1, "{name}");
         }
     }
 
@@ -144,6 +188,22 @@ mod tests {
     }
 
     #[test]
+    fn studies_have_settings_of_their_own_and_those_of_cases() {
+        let text = "[defaults]\nframes = 7\n[[study]]\nkind = \"passes\"\nbuiltin = \"atrium\"\nsizes = [\"64x48\"]\n\
+                    detail = 0.5\nmethods = \"sao\"\n[[study]]\nkind = \"z-precision\"\ntriangles = 10\n";
+        let plan = plan(text, Path::new(""), &Options::default()).unwrap();
+        let [passes, z] = &plan.studies[..] else { panic!("{plan:?}") };
+        assert_eq!((passes.kind.as_str(), z.kind.as_str()), ("passes", "z-precision"));
+        let entry = passes.entry.as_ref().unwrap();
+        assert_eq!((entry.settings.frames, entry.scene.detail), (7, Some(0.5)));
+        assert!(format!("{:?}", passes.study).contains("width: 64"), "{:?}", passes.study);
+        assert!(z.entry.is_none() && format!("{:?}", z.study).contains("triangles: 10"), "{:?}", z.study);
+        let flags = Options { size: Some(Size { width: 32, height: 32 }), ..Options::default() };
+        let plan = super::plan(text, Path::new(""), &flags).unwrap();
+        assert!(!format!("{:?}", plan.studies[0].study).contains("width"), "a flag is for all");
+    }
+
+    #[test]
     fn mistakes_are_named() {
         for (text, says) in [
             ("", "[[case]]"),
@@ -156,6 +216,12 @@ mod tests {
             ("[[case]]\nscene = \"a.glb\"\ndetail = 0.5\n", "a.glb is a file"),
             ("[[case]]\nbuiltin = \"atrium\"\nhz = [\"often\"]\n", "often"),
             ("[[case]\n", "TOML"),
+            ("[[study]]\nbuiltin = \"atrium\"\n", "kind"),
+            ("[[study]]\nkind = \"magic\"\n", "z-precision"),
+            ("[[study]]\nkind = \"radius\"\n", "either"),
+            ("[[study]]\nkind = \"radius\"\nbuiltin = \"atrium\"\nradii = \"wide\"\n", "radii"),
+            ("[[study]]\nkind = \"radius\"\nbuiltin = \"atrium\"\nsizes = [\"64x48\"]\n", "sizes"),
+            ("[[study]]\nkind = \"z-precision\"\nbuiltin = \"atrium\"\n", "builtin"),
         ] {
             let error = plan(text, Path::new(""), &Options::default()).unwrap_err();
             assert!(format!("{error:#}").contains(says), "{text}: {error:#}");

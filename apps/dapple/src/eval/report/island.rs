@@ -8,7 +8,7 @@ use dapple_render::image::Plane;
 use serde::Serialize;
 
 use super::columns::{self, Column, Kind, Setting};
-use super::results::{Case, Figure, FrameRow, Params, Results, Row};
+use super::results::{Case, Figure, FrameRow, Params, Results, Row, StudyPlot};
 
 /// Steps of the scale of signed errors.
 const ERROR_STEPS: u32 = 65;
@@ -62,6 +62,8 @@ pub(super) struct Island<'a> {
     /// For each case the pictures along the path that are in the page.
     pub(super) embedded: Vec<Vec<usize>>,
     scales: Scales,
+    /// The plots of each study.
+    studies: Vec<&'a [StudyPlot]>,
 }
 
 #[derive(Debug, Serialize)]
@@ -145,6 +147,7 @@ impl<'a> Island<'a> {
             missing: Vec::new(),
             embedded: Vec::new(),
             scales: scales()?,
+            studies: results.studies.iter().map(|study| study.plots.as_slice()).collect(),
         })
     }
 

@@ -5,6 +5,7 @@
 
 mod island;
 mod pictures;
+mod studies;
 #[cfg(test)]
 mod tests;
 mod words;
@@ -15,7 +16,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 
-use super::{advice, columns, figures, results};
+use super::{advice, columns, figures, results, table};
 use crate::picture::write_file;
 use results::Results;
 use words::escape;
@@ -24,13 +25,14 @@ const PAGE: &str = include_str!("page.html");
 const STYLE: [&str; 3] =
     [include_str!("vendor/uPlot.min.css"), include_str!("page.css"), include_str!("viewer.css")];
 /// In the order in which they build on each other; they share one scope.
-const SCRIPTS: [&str; 11] = [
+const SCRIPTS: [&str; 12] = [
     include_str!("script/data.js"),
     include_str!("script/theme.js"),
     include_str!("script/plot.js"),
     include_str!("script/marks.js"),
     include_str!("script/quality.js"),
     include_str!("script/timelines.js"),
+    include_str!("script/studies.js"),
     include_str!("script/table.js"),
     include_str!("script/stage.js"),
     include_str!("script/viewer.js"),
@@ -62,6 +64,8 @@ fn html_within(results: &Results, folder: &Path, picture_bytes: usize) -> Result
         ("headlines", &words::headlines(results)),
         ("advice", &words::advice(results)),
         ("table", &words::table(results)),
+        ("studies_link", studies::link(results)),
+        ("studies", &studies::section(results)),
         ("left_out", &left_out),
         ("made", &words::made(results)),
         ("island", &island),

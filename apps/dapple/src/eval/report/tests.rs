@@ -14,7 +14,8 @@ use tempfile::TempDir;
 use super::pictures::{BUDGET_BYTES, order_in, spread};
 use super::results::{
     Advice, Case, Figure, FrameRow, JudgeInfo, Machine, Params, Results, Row, RunInfo, SCHEMA, SceneInfo,
-    Settling, Steps, Times, Truth, TruthFrame,
+    Settling, Steps, StudyAxis, StudyColumn, StudyLine, StudyPlot, StudyResult, StudyRow, StudyTable, Times,
+    Truth, TruthFrame,
 };
 use super::{columns, html, html_within, rebuild, words};
 
@@ -133,6 +134,7 @@ fn results(cases: Vec<Case>) -> Results {
         machine: machine(),
         judge: JudgeInfo { pixels_per_degree: 67.0, lpips_weights: None },
         cases,
+        studies: Vec::new(),
         failures: Vec::new(),
         advice: Vec::new(),
     }
@@ -148,6 +150,35 @@ fn small() -> Results {
             row("hall", "none", None, &[14.0, 14.0]),
         ],
     )])
+}
+
+/// A study with a table and two plots, one of them over logarithms.
+fn study(name: &str) -> StudyResult {
+    let axis = |title: &str, is_log| StudyAxis { title: title.to_owned(), unit: "m".to_owned(), is_log };
+    let plot = |is_log| StudyPlot {
+        title: name.to_owned(),
+        x: axis(name, is_log),
+        y: axis("error", is_log),
+        lines: (1..4)
+            .map(|k| StudyLine {
+                name: format!("{name} {k}"),
+                points: (1..5).map(|i| [f64::from(i), f64::from(k) * f64::from(i * i)]).collect(),
+            })
+            .collect(),
+    };
+    StudyResult {
+        kind: "radius".to_owned(),
+        title: name.to_owned(),
+        subject: Some("hall / walk".to_owned()),
+        notes: vec![name.to_owned()],
+        tables: vec![StudyTable {
+            title: name.to_owned(),
+            columns: vec![StudyColumn { title: name.to_owned(), unit: "mm".to_owned(), digits: 2 }; 2],
+            rows: vec![StudyRow { name: name.to_owned(), values: vec![Some(1.5), None] }],
+        }],
+        plots: vec![plot(false), plot(true)],
+        machine: machine(),
+    }
 }
 
 fn names(results: &Results) -> Vec<String> {
@@ -240,6 +271,7 @@ fn words_cannot_become_markup() {
     results.cases[0].path = HOSTILE.to_owned();
     results.cases[0].scene.name = HOSTILE.to_owned();
     results.cases[0].scene.warnings.push(HOSTILE.to_owned());
+    results.studies.push(study(HOSTILE));
     results.advice.push(Advice { case: Some(0), text: HOSTILE.to_owned() });
     let folder = TempDir::new().unwrap();
     let page = html(&results, folder.path()).unwrap();
@@ -249,6 +281,7 @@ fn words_cannot_become_markup() {
     }
     let island = island(&page);
     assert_eq!(island["title"], HOSTILE);
+    assert_eq!(island["studies"][0][0]["title"], HOSTILE);
     assert_eq!(island["cases"][0]["name"], HOSTILE);
     assert_eq!(island["cases"][0]["rows"][0]["method"], HOSTILE);
 }

@@ -156,6 +156,7 @@ function start() {
   onTheme(redrawPlots);
   startTheme();
   startQuality();
+  startStudies();
   startTable();
   startViewer();
   startTimelines();

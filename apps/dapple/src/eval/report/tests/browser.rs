@@ -77,6 +77,8 @@ const LOOK: &str = "
     return {
       quality: canvases('quality-plots').map(drawn),
       time: canvases('time-plots').map(drawn),
+      studies: canvases('studies').filter((canvas) => !canvas.classList.contains('swatch')).map(drawn),
+      studyCells: [...document.querySelectorAll('#studies td')].map((cell) => cell.textContent),
       rows: document.querySelectorAll('#figures tbody tr').length,
       stage: document.querySelectorAll('.stage .pane').length,
       width: document.documentElement.scrollWidth,
@@ -150,7 +152,8 @@ fn assert_quiet(report: &Value) {
 fn a_browser_shows_everything_and_answers() {
     let Some(tools) = tools() else { return };
     let folder = TempDir::new().unwrap();
-    let results = small();
+    let mut results = small();
+    results.studies = vec![study("radius"), StudyResult { plots: Vec::new(), ..study("passes") }];
     write_pictures(folder.path(), &results);
     // Away from the pictures: what is shown is in the file.
     let page = TempDir::new().unwrap();
@@ -174,7 +177,9 @@ fn a_browser_shows_everything_and_answers() {
         };
         assert_eq!(plots("quality").len(), 1, "{report:#}");
         assert_eq!(plots("time").len(), 3, "figures, bits, settling: {report:#}");
-        for colors in [plots("quality"), plots("time")].concat() {
+        assert_eq!(plots("studies").len(), 2, "{report:#}");
+        assert_eq!(facts["studyCells"], json!(["1.50", "–", "1.50", "–"]), "{report:#}");
+        for colors in [plots("quality"), plots("time"), plots("studies")].concat() {
             assert!(colors > 4, "a plot is blank: {report:#}");
         }
         assert_eq!(facts["rows"], 4);
@@ -229,6 +234,7 @@ fn a_browser_shows_what_there_is_of_poor_results() {
         case("b", vec![row("b", "psao", Some(512.0), &[31.0, 30.0])]),
     ]);
     hostile.title = HOSTILE.to_owned();
+    hostile.studies.push(study(HOSTILE));
     let pages = [
         ("single", single, 1),
         ("nothing", results(vec![]), 0),

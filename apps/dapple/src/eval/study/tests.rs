@@ -1,0 +1,120 @@
+//! Every kind of study, small.
+
+use std::sync::Arc;
+
+use super::*;
+use crate::args::{Options, Size};
+use crate::eval::plan::Settings;
+use crate::source::{Loaded, find_path};
+
+/// Runs the study that a `[[study]]` without a scene describes, on a small atrium.
+fn run(text: &str, size: [u32; 2]) -> Findings {
+    let mut table: toml::Table = text.parse().unwrap();
+    let Some(toml::Value::String(kind)) = table.remove("kind") else { panic!("no kind") };
+    let study = read(&kind, &mut table).unwrap();
+    assert!(table.is_empty(), "{table:?}");
+    let folder = tempfile::tempdir().unwrap();
+    let glb = dapple_scene::builtin::glb("atrium", 0.1).unwrap();
+    let scene = dapple_scene::load("atrium.glb", &glb, &dapple_scene::NoFiles).unwrap();
+    let loaded = Loaded { scene: Arc::new(scene), title: "atrium".to_owned() };
+    let options = Options {
+        size: Some(Size { width: size[0], height: size[1] }),
+        frames: Some(2),
+        supersample: Some(1),
+        reference_rays: Some(16),
+        ..Options::default()
+    };
+    let settings = Settings::new(&options, false).unwrap();
+    let path = find_path(&loaded.scene, None).unwrap();
+    let tracer = dapple_trace::Tracer::new(&loaded.scene, &loaded.scene.pose(0.0));
+    let stage = Stage::new(&loaded, &settings, path, (0.6, 1.0), tracer);
+    let cache = Cache::new(folder.path());
+    let stage = study.has_scene().then_some(&stage);
+    assert!(study.work(stage) > 0.0 && !study.title().is_empty());
+    let findings =
+        study.run(&Subject { stage, cache: &cache, progress: &|part| assert!(part <= 1.0) }).unwrap();
+    assert!(!findings.tables.is_empty() && !findings.notes.is_empty(), "{findings:?}");
+    for table in &findings.tables {
+        assert!(!table.rows.is_empty(), "{table:?}");
+        for row in &table.rows {
+            assert_eq!(row.values.len(), table.columns.len(), "{table:?}");
+        }
+    }
+    for plot in &findings.plots {
+        assert!(plot.lines.iter().any(|line| line.points.len() > 1), "{plot:?}");
+        for [x, y] in plot.lines.iter().flat_map(|line| &line.points) {
+            assert!(x.is_finite() && y.is_finite(), "{plot:?}");
+            assert!((!plot.x.is_log || *x > 0.0) && (!plot.y.is_log || *y > 0.0), "{plot:?}");
+        }
+    }
+    findings
+}
+
+fn value(findings: &Findings, table: usize, row: usize, column: usize) -> f64 {
+    findings.tables[table].rows[row].values[column].unwrap()
+}
+
+#[test]
+fn filters_are_compared_with_no_levels() {
+    let found = run("kind = \"mip-filters\"", [160, 90]);
+    let psnr: Vec<f64> = (0..5).map(|row| value(&found, 0, row, 0)).collect();
+    assert!(psnr.iter().all(|db| (10.0..80.0).contains(db)), "{psnr:?}");
+    assert!(psnr[1..].iter().all(|other| *other < psnr[0]), "the rotated grid is the nearest: {psnr:?}");
+    // Of four the farthest never blocks more, the nearest never less.
+    assert!(value(&found, 0, 3, 1) > value(&found, 0, 4, 1));
+}
+
+#[test]
+fn traffic_of_sao_does_not_grow_with_the_radius() {
+    let found = run("kind = \"radius\"\nradii = [0.1, 1.0, 3.0]", [640, 360]);
+    let memory = |row, pass| value(&found, 0, row, pass);
+    assert!(memory(2, 0) > 3.0 * memory(0, 0), "alchemy: {} to {}", memory(0, 0), memory(2, 0));
+    assert!(memory(2, 2) < 1.6 * memory(0, 2), "sao: {} to {}", memory(0, 2), memory(2, 2));
+    assert!(memory(2, 1) > memory(2, 2), "levels save");
+    for row in 0..3 {
+        let asked = [0, 1, 2].map(|pass| value(&found, 2, row, pass));
+        // At most 13 positions and a normal; 10 distances.
+        assert!(asked[0] <= 212.0 && asked[1] <= 40.0 && asked[1] == asked[2], "{asked:?}");
+        assert!(asked.iter().all(|asked| *asked > 4.0));
+    }
+}
+
+#[test]
+fn passes_add_up() {
+    let found = run("kind = \"passes\"\nsizes = [\"64x36\", \"96x54\"]\nrepeats = 1", [64, 36]);
+    assert_eq!(found.tables[0].rows.len(), 2);
+    let row: Vec<f64> = (0..9).map(|column| value(&found, 0, 1, column)).collect();
+    assert_eq!(row[..2], [6.0, 108.0 * 66.0]);
+    assert!((row[2..7].iter().sum::<f64>() - row[7]).abs() < 1e-9, "{row:?}");
+    assert!((row[8] - 1e6 * row[7] / (96.0 * 54.0)).abs() < 1e-6, "{row:?}");
+    let all = &found.tables[1];
+    assert_eq!(all.rows.len(), ScreenSpace::ALL.len());
+    for row in &all.rows {
+        let sum: f64 = row.values[..3].iter().flatten().sum();
+        assert!((sum - row.values[3].unwrap()).abs() < 1e-9, "{row:?}");
+        assert_eq!(row.values[0].is_some(), row.name == "sao", "{row:?}");
+    }
+}
+
+#[test]
+fn presets_and_guard_bands_are_judged_by_the_truth() {
+    let presets = run("kind = \"presets\"", [64, 36]);
+    assert_eq!(presets.tables[0].rows.len(), ScreenSpace::ALL.len());
+    let bands = run("kind = \"guard-band\"\nparts = [0.0, 0.1, 0.3]", [64, 36]);
+    for found in [&presets, &bands] {
+        let all = found.tables[0].rows.iter().flat_map(|row| row.values.iter().flatten());
+        assert!(all.clone().all(|db| (8.0..40.0).contains(db)), "{found:?}");
+    }
+    // The default preset and band are the same run.
+    let high = value(&presets, 0, 2, 2);
+    assert!((high - value(&bands, 0, 2, 1)).abs() < 1e-9, "{high}");
+}
+
+#[test]
+fn precision_is_studied_without_a_scene() {
+    let found = run("kind = \"z-precision\"\ndistances = [1.0, 10.0, 100.0]\ntriangles = 300", [16, 16]);
+    assert_eq!(found.tables[0].rows.len(), 8);
+    // Sixteen bits are worse than any other.
+    let most = |row| value(&found, 0, row, 3);
+    assert!((2..8).all(|row| most(0) > 10.0 * most(row)), "{found:?}");
+}
