@@ -166,6 +166,10 @@ export interface Options {
   radius?: number;
   /** Of the same: how far beyond the picture they look, as a part of its height, 0 to 0.5. Default 0.1. */
   guardBand?: number;
+  /** Of the same: how much work they do. Default `high`; `low` and `medium` look at a quarter of the samples. */
+  aoPreset?: "low" | "medium" | "high" | "ultra";
+  /** Of the same: whether they look at a quarter of the samples. Default: as the preset has it. */
+  halfResolution?: boolean;
   /** Default `beauty`. */
   view?: View;
   /** Another method right of a part (0 to 1) of the width. Default none. */

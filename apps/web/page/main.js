@@ -16,8 +16,8 @@ const STAGES = {
   light: "Laying out the light",
 };
 const NUMBERS = ["time", "shadowResolution", "samples", "fade", "radius", "guardBand", "maxPixelRatio", "animation"];
-const FLAGS = ["paused", "loop"];
-const WORDS = ["scene", "stream", "live", "token", "transport", "backend", "method", "fallback", "view", "camera"];
+const FLAGS = ["paused", "loop", "halfResolution"];
+const WORDS = ["scene", "stream", "live", "token", "transport", "backend", "method", "fallback", "aoPreset", "view", "camera"];
 
 const session = new SessionPanel();
 let viewer = null;

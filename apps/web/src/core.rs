@@ -250,17 +250,26 @@ impl Core {
         Ok(())
     }
 
-    /// Of methods that look at the picture alone: how far away what blocks may be, metres, and how far beyond the picture is looked, as a part
-    /// of its height.
+    /// Of methods that look at the picture alone: how far away what blocks may be, metres; how far beyond the picture is looked, as a part
+    /// of its height; how much work they do, by name; whether at half the resolution, if not as the preset has it.
     #[wasm_bindgen(js_name = setScreenSpace)]
-    pub fn set_screen_space(&mut self, radius_m: f32, guard_band: f32) {
+    pub fn set_screen_space(
+        &mut self,
+        radius_m: f32,
+        guard_band: f32,
+        preset: &str,
+        half_resolution: Option<bool>,
+    ) -> Result<(), JsError> {
         let usual = ScreenOptions::default();
         let positive = radius_m.is_finite() && radius_m > 0.0;
         self.options.screen = ScreenOptions {
             radius_m: if positive { radius_m } else { usual.radius_m },
             guard_band: if guard_band.is_finite() { guard_band.clamp(0.0, 0.5) } else { usual.guard_band },
+            preset: names::effort(preset)?,
+            half_resolution,
         };
         self.changed = true;
+        Ok(())
     }
 
     /// What is shown, by name.

@@ -1,6 +1,7 @@
 //! What JavaScript calls the choices.
 
 use dapple_client::viewer::{DebugView, Method};
+use dapple_render::Preset;
 use dapple_render::screen_space::ScreenKind;
 
 /// Which of a browser's two interfaces to graphics cards draws.
@@ -87,6 +88,11 @@ pub fn fallback(name: &str) -> Result<Option<ScreenKind>, UnknownName> {
     }
 }
 
+/// The amount of work of that name: `low`, `medium`, `high`, `ultra`.
+pub fn effort(name: &str) -> Result<Preset, UnknownName> {
+    find(&Preset::ALL.map(|preset| (preset.name(), preset)), "aoPreset", name)
+}
+
 /// The view of that name: `beauty`, `visibility`, `normal`, `points`, `texels`, `weights`, `age`, `error`.
 pub fn view(name: &str) -> Result<DebugView, UnknownName> {
     find(&VIEWS, "view", name)
@@ -114,6 +120,8 @@ mod tests {
         assert_eq!(view("age"), Ok(DebugView::Age));
         assert_eq!(fallback("sao"), Ok(Some(ScreenKind::Sao)));
         assert_eq!(fallback("none"), Ok(None));
+        assert_eq!(effort("low"), Ok(Preset::Low));
+        assert!(effort("most").unwrap_err().to_string().ends_with("low, medium, high, ultra"));
         let known = "ssao, alchemy, sao, hbao, hbao-plus, gtao, none";
         assert_eq!(
             fallback("psao").unwrap_err().to_string(),

@@ -4,6 +4,9 @@ use rayon::prelude::*;
 
 use crate::gbuffer::Screen;
 
+/// A slope is gentler than another if it is less than this part of it.
+const MUCH_GENTLER: f32 = 0.9;
+
 /// How wide, and how strictly within surfaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Bilateral {
@@ -63,13 +66,16 @@ impl Bilateral {
         if !distance.is_finite() {
             return value;
         }
-        // The gentler of the slopes to both sides: the other may lead over an edge.
+        // The gentler of the slopes to both sides: the other may lead over an edge. Of two that are about alike the first, so that rounding decides nothing.
         let slopes = [at.checked_sub(1), Some(at + 1).filter(|next| *next < count)].map(|next| {
             let next = next?;
             Some((sample(next).1 - distance) * (next as f32 - at as f32)).filter(|slope| slope.is_finite())
         });
-        let slope =
-            slopes.into_iter().flatten().reduce(|a, b| if a.abs() < b.abs() { a } else { b }).unwrap_or(0.0);
+        let slope = slopes
+            .into_iter()
+            .flatten()
+            .reduce(|a, b| if b.abs() < MUCH_GENTLER * a.abs() { b } else { a })
+            .unwrap_or(0.0);
         let (mut sum, mut weights) = (bell[0] * value, bell[0]);
         for (tap, bell) in bell.iter().enumerate().skip(1) {
             let step = tap * self.stride as usize;

@@ -29,25 +29,6 @@ pub(crate) fn perspective(fx: f64, fy: f64, near: f64) -> DMat4 {
     )
 }
 
-/// The camera of a picture that is larger by `guard` pixels on each side, of one that is `height` pixels high: what both show is alike.
-#[cfg(feature = "gpu")]
-pub(crate) fn guarded(camera: &PosedCamera, height: u32, guard: u32) -> PosedCamera {
-    if guard == 0 {
-        return *camera;
-    }
-    let scale = (f64::from(height) + 2.0 * f64::from(guard)) / f64::from(height);
-    let projection = match camera.projection {
-        Projection::Perspective { yfov, near } => {
-            let half = libm::tan(0.5 * f64::from(yfov)) * scale;
-            Projection::Perspective { yfov: (2.0 * libm::atan(half)) as f32, near }
-        }
-        Projection::Orthographic { half_height, near, far } => {
-            Projection::Orthographic { half_height: (f64::from(half_height) * scale) as f32, near, far }
-        }
-    };
-    PosedCamera { projection, ..*camera }
-}
-
 /// Parallel projection of a box that is symmetric about the view axis.
 pub(crate) fn orthographic(half_width: f64, half_height: f64, near: f64, far: f64) -> DMat4 {
     let depth = far - near;

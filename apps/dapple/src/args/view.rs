@@ -8,7 +8,7 @@ use dapple_render::screen_space::ScreenKind;
 
 use serde::Deserialize;
 
-use super::{BitRate, SceneChoice, Size, StepArgs, VisibilityArgs};
+use super::{BitRate, EffortArgs, SceneChoice, Size, StepArgs, VisibilityArgs};
 
 pub(crate) const VIEW_EXAMPLES: &str = "\
 Examples:
@@ -69,9 +69,8 @@ pub(crate) struct ViewArgs {
     /// What stands in for points while there are none: a screen-space method, or none.
     #[arg(long, value_enum, value_name = "METHOD", default_value = "none")]
     pub(crate) fallback: ViewMethod,
-    /// How far beyond the picture screen-space methods look, as a part of its height, 0 to 0.5.
-    #[arg(long, value_name = "PART", default_value_t = 0.1)]
-    pub(crate) guard_band: f32,
+    #[command(flatten)]
+    pub(crate) effort: EffortArgs,
     /// Seconds that an update fades in over; 0 for none [default: as long as updates are apart, at most half a second; 0 with --headless].
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) fade: Option<f32>,

@@ -84,9 +84,6 @@ fn check(args: &ViewArgs) -> Result<()> {
     if args.fallback.screen_space().is_none() && args.fallback != ViewMethod::None {
         bail!("--fallback stands in for points: choose a screen-space method (as sao), or none");
     }
-    if !(0.0..=0.5).contains(&args.guard_band) {
-        bail!("--guard-band is {}, must be 0 to 0.5", args.guard_band);
-    }
     if let Some(file) = &args.record_path {
         if !source::is_path_file(&file.to_string_lossy()) {
             bail!("--record-path {} would hold a camera path: name it .json", file.display());
@@ -157,6 +154,7 @@ fn open(args: &ViewArgs) -> Result<Opening> {
         None if args.view == crate::args::ViewKind::Error => Some((0.0, other)),
         None => None,
     };
+    let effort = args.effort.effort();
     let radius_m = match radius_m {
         Some(radius_m) => radius_m,
         None => source::resolve_radius(&scene, &args.visibility)?.0,
@@ -167,7 +165,12 @@ fn open(args: &ViewArgs) -> Result<Opening> {
         split,
         fade_s,
         fallback: args.fallback.screen_space(),
-        screen: ScreenOptions { radius_m, guard_band: args.guard_band },
+        screen: ScreenOptions {
+            radius_m,
+            guard_band: effort.guard_band,
+            preset: effort.preset,
+            half_resolution: effort.half_resolution,
+        },
         ..usual
     };
     Ok(Opening { scene, title, feed, steering, options, quality, light })

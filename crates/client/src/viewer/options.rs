@@ -1,6 +1,7 @@
 //! What a viewer is asked for, and what it says of itself.
 
 use dapple_gpu::{GpuFault, wgpu};
+use dapple_render::Preset;
 use dapple_render::forward::ForwardError;
 use dapple_render::image::ToneMap;
 use dapple_render::screen_space::ScreenKind;
@@ -52,11 +53,15 @@ pub struct ScreenOptions {
     pub radius_m: f32,
     /// How far beyond the picture is looked, as a part of its height, 0 … 0.5; default 0.1.
     pub guard_band: f32,
+    /// How much work they do.
+    pub preset: Preset,
+    /// Whether they look at a quarter of the samples, and the rest follows; `None` (default) as the preset has it.
+    pub half_resolution: Option<bool>,
 }
 
 impl Default for ScreenOptions {
     fn default() -> Self {
-        ScreenOptions { radius_m: 0.6, guard_band: 0.1 }
+        ScreenOptions { radius_m: 0.6, guard_band: 0.1, preset: Preset::default(), half_resolution: None }
     }
 }
 

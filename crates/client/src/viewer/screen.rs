@@ -1,8 +1,10 @@
 //! Methods that look at the picture alone, each made when it is first asked for.
 
 use dapple_gpu::{Gpu, wgpu};
+use dapple_render::Chosen;
 use dapple_render::forward::{Forward, ForwardError, GpuScene, LookupId};
-use dapple_render::screen_space::{ScreenKind, ScreenPasses};
+use dapple_render::gbuffer::GuardBand;
+use dapple_render::screen_space::{ScreenKind, ScreenPasses, ScreenView};
 use dapple_scene::{Pose, PosedCamera};
 
 use super::options::ScreenOptions;
@@ -50,7 +52,8 @@ impl ScreenSpace {
     ) -> Result<(), ForwardError> {
         self.kinds = [None; 2];
         let Picture { scene, pose, camera, size } = picture;
-        let guard = (f64::from(options.guard_band.clamp(0.0, 0.5)) * f64::from(size.1)).round() as u32;
+        let part = options.guard_band.clamp(0.0, GuardBand::MAX_PART);
+        let guard = GuardBand::of_height(part, size.1).unwrap_or_default();
         for &kind in wanted {
             if self.kinds.contains(&Some(kind)) {
                 continue;
@@ -64,8 +67,15 @@ impl ScreenSpace {
                 };
             }
             let Slot::Made(passes) = slot else { continue };
-            let method = kind.method().with_radius(options.radius_m);
-            passes.draw(gpu, encoder, forward, scene, pose, camera, size, &method, guard)?;
+            let Chosen { params, half_resolution } = kind.preset(options.preset);
+            let view = ScreenView {
+                camera: *camera,
+                size,
+                method: params.with_radius(options.radius_m),
+                guard,
+                half_resolution: options.half_resolution.unwrap_or(half_resolution),
+            };
+            passes.draw(gpu, encoder, forward, scene, pose, &view)?;
             self.kinds[index] = Some(kind);
         }
         Ok(())

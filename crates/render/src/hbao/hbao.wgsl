@@ -36,7 +36,7 @@ fn occlusion_at(at: vec2<i32>) -> f32 {
         var sine = 0.0;
         if params.is_mean == 0u {
             // Where the plane of the surface goes in that direction of the picture.
-            let next = on_plane(vec2<f32>(at) + 0.5 + direction, place.xyz, normal);
+            let next = on_plane(centre(at) + direction, place.xyz, normal);
             let along = select(vec3(0.0, 0.0, -1.0), next.xyz - place.xyz, next.w > 0.0);
             let tangent = asin(clamp(along.z / max(length(along), 1e-12), -1.0, 1.0));
             sine = sin(min(tangent + params.bias, 0.5 * PI));

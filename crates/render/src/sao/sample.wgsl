@@ -32,6 +32,9 @@ fn quad_normal(at: vec2<i32>) -> vec3<f32> {
 fn read_level(level: u32, at: vec2<u32>) -> vec3<f32> {
     var texel = at >> vec2(level);
     let distance = textureLoad(distances, vec2<i32>(texel), i32(level)).r;
+    if level == 0u {
+        return vec3(distance, centre(vec2<i32>(texel)));
+    }
     if !USES_ROTATED_GRID {
         let low = texel << vec2(level);
         let high = min((texel + 1u) << vec2(level), screen.size);
@@ -41,7 +44,7 @@ fn read_level(level: u32, at: vec2<u32>) -> vec3<f32> {
         let last = ((screen.size + ((1u << (above - 1u)) - 1u)) >> vec2(above - 1u)) - 1u;
         texel = min(texel * 2u + ((texel.yx & vec2(1u)) ^ vec2(1u)), last);
     }
-    return vec3(distance, vec2<f32>(texel) + 0.5);
+    return vec3(distance, centre(vec2<i32>(texel)));
 }
 
 fn visibility_at(at: vec2<i32>) -> f32 {

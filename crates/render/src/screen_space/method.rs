@@ -1,12 +1,12 @@
 //! The methods by one name each.
 
-use crate::RenderError;
 use crate::alchemy::{self, AlchemyParams};
 use crate::gbuffer::Screen;
 use crate::gtao::{self, GtaoParams};
 use crate::hbao::{self, HbaoParams, Horizon};
 use crate::sao::{self, SaoParams};
 use crate::ssao::{self, SsaoParams};
+use crate::{Chosen, Preset, RenderError};
 
 /// Which method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -50,13 +50,21 @@ impl ScreenKind {
 
     /// With its defaults.
     pub fn method(self) -> ScreenMethod {
+        self.preset(Preset::default()).params
+    }
+
+    /// With a preset's parameters, and the resolution that they are meant for.
+    pub fn preset(self, preset: Preset) -> Chosen<ScreenMethod> {
+        fn of<P>(chosen: Chosen<P>, method: impl Fn(P) -> ScreenMethod) -> Chosen<ScreenMethod> {
+            Chosen { params: method(chosen.params), half_resolution: chosen.half_resolution }
+        }
         match self {
-            ScreenKind::Ssao => ScreenMethod::Ssao(SsaoParams::default()),
-            ScreenKind::Alchemy => ScreenMethod::Alchemy(AlchemyParams::default()),
-            ScreenKind::Sao => ScreenMethod::Sao(SaoParams::default()),
-            ScreenKind::Hbao => ScreenMethod::Hbao(HbaoParams::hbao()),
-            ScreenKind::HbaoPlus => ScreenMethod::Hbao(HbaoParams::hbao_plus()),
-            ScreenKind::Gtao => ScreenMethod::Gtao(GtaoParams::default()),
+            ScreenKind::Ssao => of(preset.ssao(), ScreenMethod::Ssao),
+            ScreenKind::Alchemy => of(preset.alchemy(), ScreenMethod::Alchemy),
+            ScreenKind::Sao => of(preset.sao(), ScreenMethod::Sao),
+            ScreenKind::Hbao => of(preset.hbao(), ScreenMethod::Hbao),
+            ScreenKind::HbaoPlus => of(preset.hbao_plus(), ScreenMethod::Hbao),
+            ScreenKind::Gtao => of(preset.gtao(), ScreenMethod::Gtao),
         }
     }
 }

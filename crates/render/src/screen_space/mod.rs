@@ -13,4 +13,4 @@ mod uniforms;
 
 pub use method::{ScreenKind, ScreenMethod};
 #[cfg(feature = "gpu")]
-pub use passes::ScreenPasses;
+pub use passes::{ScreenPasses, ScreenView};

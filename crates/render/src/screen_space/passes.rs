@@ -6,9 +6,11 @@ use dapple_gpu::{Gpu, shader_module, wgpu};
 use dapple_scene::{Pose, PosedCamera};
 
 use super::method::ScreenMethod;
-use super::plan::{Image, Pass, Shader, level_size, levels, passes};
+use super::plan::{Image, Pass, Shader, level_size, levels, passes, seen_size};
 use super::uniforms::ScreenUniform;
 use crate::forward::{Forward, ForwardError, GeometryTarget, GpuScene, Lookup, LookupId};
+use crate::gbuffer::GuardBand;
+use crate::sao::MAX_LEVELS;
 
 /// One screen-space method on a card: draws depths and normals of a view, runs the method over them, and lets the forward pass look the result up. Keeps what it makes
 /// from frame to frame.
@@ -21,16 +23,43 @@ pub struct ScreenPasses {
     pipelines: BTreeMap<(Shader, Image), wgpu::RenderPipeline>,
     /// What passes bind that write the distances themselves.
     blank: wgpu::TextureView,
-    screen: wgpu::Buffer,
+    /// Of the whole picture, and of half its resolution.
+    screens: [wgpu::Buffer; 2],
     plan: Option<Plan>,
+}
+
+/// What a method is to do for one picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScreenView {
+    /// The picture's camera.
+    pub camera: PosedCamera,
+    /// Its columns and rows.
+    pub size: (u32, u32),
+    /// The method and its parameters.
+    pub method: ScreenMethod,
+    /// What is drawn beyond the picture, where things block, too.
+    pub guard: GuardBand,
+    /// Whether a quarter of the samples is estimated ([`crate::upsample`]).
+    pub half_resolution: bool,
+}
+
+impl ScreenView {
+    fn guarded(&self) -> [u32; 2] {
+        self.guard.size([self.size.0, self.size.1])
+    }
+}
+
+impl Plan {
+    fn serves(&self, view: &ScreenView) -> bool {
+        ScreenView { camera: self.view.camera, ..*view } == self.view
+    }
 }
 
 /// All that one method needs for pictures of one size.
 #[derive(Debug)]
 struct Plan {
-    method: ScreenMethod,
-    size: (u32, u32),
-    guard: u32,
+    /// What it was made for; its camera is the first's.
+    view: ScreenView,
     normals: wgpu::TextureView,
     depths: wgpu::TextureView,
     steps: Vec<Step>,
@@ -88,23 +117,24 @@ impl ScreenPasses {
             lookup_layout: lookup_layout(device),
             pipelines: BTreeMap::new(),
             blank: texture(gpu, Image::Distances(0).format(), (1, 1), 1).create_view(&Default::default()),
-            screen: device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("screen"),
-                size: size_of::<ScreenUniform>() as u64,
-                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
+            screens: [(); 2].map(|()| {
+                device.create_buffer(&wgpu::BufferDescriptor {
+                    label: Some("screen"),
+                    size: size_of::<ScreenUniform>() as u64,
+                    usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                    mapped_at_creation: false,
+                })
             }),
             layouts,
             plan: None,
         })
     }
 
-    /// Records the method's passes for a picture of `size` pixels and gives `forward` the result for its look-up. `camera`, `pose` and `size` must be those that the picture is
-    /// then drawn with. The geometry is drawn anew, with `guard` pixels more on each side, in which what is just outside of the picture still blocks.
+    /// Records the method's passes for a picture and gives `forward` the result for its look-up. The view's camera and size, and the pose, must be those that the
+    /// picture is then drawn with. The geometry is drawn anew, with the guard band.
     ///
     /// # Errors
     /// A parameter out of its range, or what [`Forward::draw_geometry`] refuses. Then nothing is recorded.
-    #[allow(clippy::too_many_arguments, reason = "a picture has that many sides")]
     pub fn draw(
         &mut self,
         gpu: &Gpu,
@@ -112,12 +142,9 @@ impl ScreenPasses {
         forward: &mut Forward,
         scene: &mut GpuScene,
         pose: &Pose,
-        camera: &PosedCamera,
-        size: (u32, u32),
-        method: &ScreenMethod,
-        guard: u32,
+        view: &ScreenView,
     ) -> Result<(), ForwardError> {
-        self.draw_geometry(gpu, encoder, forward, scene, pose, camera, size, method, guard)?;
+        self.draw_geometry(gpu, encoder, forward, scene, pose, view)?;
         for step in 0..self.steps().count() {
             self.record_step(encoder, step);
         }
@@ -128,7 +155,6 @@ impl ScreenPasses {
     ///
     /// # Errors
     /// Those of [`ScreenPasses::draw`].
-    #[allow(clippy::too_many_arguments, reason = "a picture has that many sides")]
     pub fn draw_geometry(
         &mut self,
         gpu: &Gpu,
@@ -136,30 +162,30 @@ impl ScreenPasses {
         forward: &mut Forward,
         scene: &mut GpuScene,
         pose: &Pose,
-        camera: &PosedCamera,
-        size: (u32, u32),
-        method: &ScreenMethod,
-        guard: u32,
+        view: &ScreenView,
     ) -> Result<(), ForwardError> {
-        method.check()?;
+        view.method.check()?;
         let largest = gpu.device.limits().max_texture_dimension_2d;
+        let [width, height] = view.guarded();
         // Levels halve what is made even first.
-        let room = largest.saturating_sub(1 << levels(method, size));
-        if [size.0, size.1].iter().any(|side| *side == 0 || side.saturating_add(2 * guard) > room) {
+        let room = largest.saturating_sub(1 << MAX_LEVELS);
+        if view.size.0 == 0 || view.size.1 == 0 || width.max(height) > room {
             let reason = "the picture has no pixels, or with its guard band more than the device allows: make it smaller";
             return Err(ForwardError::Frame { reason });
         }
-        let guarded = (size.0 + 2 * guard, size.1 + 2 * guard);
-        let camera = crate::projection::guarded(camera, size.1, guard);
-        let is_current =
-            self.plan.as_ref().is_some_and(|p| p.method == *method && p.size == size && p.guard == guard);
+        let is_current = self.plan.as_ref().is_some_and(|plan| plan.serves(view));
         if !is_current {
-            self.plan = Some(self.make_plan(gpu, method, size, guard));
+            self.plan = Some(self.make_plan(gpu, view));
         }
         let Some(plan) = &self.plan else { return Ok(()) };
-        let target = GeometryTarget { camera, size: guarded, normals: &plan.normals, depths: &plan.depths };
+        let camera = view.guard.camera(&view.camera, view.size.1);
+        let size = (width, height);
+        let target = GeometryTarget { camera, size, normals: &plan.normals, depths: &plan.depths };
         forward.draw_geometry(gpu, encoder, scene, pose, &[target])?;
-        gpu.queue.write_buffer(&self.screen, 0, bytemuck::bytes_of(&ScreenUniform::new(&camera, guarded)));
+        let full = ScreenUniform::new(&camera, size);
+        for (buffer, uniform) in self.screens.iter().zip([full, full.half()]) {
+            gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&uniform));
+        }
         let view = plan.picture.create_view(&Default::default());
         forward
             .bind_lookup(self.lookup, group(&gpu.device, &self.lookup_layout, &[Resource::Texture(&view)]));
@@ -200,18 +226,24 @@ impl ScreenPasses {
         self.plan.as_ref().map(|plan| &plan.picture)
     }
 
-    fn make_plan(&mut self, gpu: &Gpu, method: &ScreenMethod, size: (u32, u32), guard: u32) -> Plan {
-        let guarded = (size.0 + 2 * guard, size.1 + 2 * guard);
-        let level_count = levels(method, guarded) + 1;
+    fn make_plan(&mut self, gpu: &Gpu, view: &ScreenView) -> Plan {
+        let [width, height] = view.guarded();
+        let full = (width, height);
+        let seen = seen_size(full, view.half_resolution);
+        let level_count = levels(&view.method, seen) + 1;
         // The twin's levels are rounded up, a card's down: its first one is larger then, and passes write parts alone.
         let whole = 1 << (level_count - 1);
-        let padded = (guarded.0.next_multiple_of(whole), guarded.1.next_multiple_of(whole));
+        let padded = (seen.0.next_multiple_of(whole), seen.1.next_multiple_of(whole));
         let distances = texture(gpu, Image::Distances(0).format(), padded, level_count);
-        let plain = |format, size| texture(gpu, format, size, 1).create_view(&Default::default());
-        let picture = texture(gpu, Image::Picture.format(), size, 1);
+        let picture = texture(gpu, Image::Picture.format(), view.size, 1);
+        let size_of = |image| match image {
+            Image::Picture => view.size,
+            Image::Depths | Image::Normals | Image::FullDistances => full,
+            Image::Distances(level) => level_size(seen, level),
+            Image::HalfNormals | Image::Value(_) | Image::Packed(_) => seen,
+        };
+        let passes = passes(&view.method, full, view.guard.pixels(), view.half_resolution);
         let mut views: BTreeMap<Image, wgpu::TextureView> = BTreeMap::new();
-        let depths = plain(GeometryTarget::DEPTH_FORMAT, guarded);
-        views.insert(Image::Depths, depths.clone());
         views.insert(Image::Picture, picture.create_view(&Default::default()));
         for level in 0..level_count {
             let descriptor = wgpu::TextureViewDescriptor {
@@ -221,15 +253,27 @@ impl ScreenPasses {
             };
             views.insert(Image::Distances(level), distances.create_view(&descriptor));
         }
+        let named = passes.iter().flat_map(|pass| pass.reads.into_iter().chain([pass.writes]));
+        for image in named.chain([Image::Normals]) {
+            let plain = || texture(gpu, image.format(), size_of(image), 1).create_view(&Default::default());
+            views.entry(image).or_insert_with(plain);
+        }
         let all_distances = distances.create_view(&Default::default());
-        let normals = plain(GeometryTarget::NORMAL_FORMAT, guarded);
         let mut steps = Vec::new();
-        for Pass { shader, reads, writes, params } in passes(method, guarded, guard) {
-            for image in reads.into_iter().chain([writes]) {
-                views.entry(image).or_insert_with(|| plain(image.format(), guarded));
-            }
-            let is_pyramid = matches!(writes, Image::Distances(_));
-            let distances = if is_pyramid { &self.blank } else { &all_distances };
+        for Pass { shader, reads, writes, params } in passes {
+            // The picture is placed among all samples.
+            let is_half = view.half_resolution && writes != Image::Picture;
+            let distances = match (shader, view.half_resolution) {
+                // What they write themselves cannot be read.
+                (Shader::Distance | Shader::Minify | Shader::Halve, _) => &self.blank,
+                (Shader::Place, true) => &views[&Image::FullDistances],
+                _ => &all_distances,
+            };
+            let normals = match shader {
+                Shader::Distance | Shader::Minify | Shader::Halve => &self.blank,
+                _ if is_half => &views[&Image::HalfNormals],
+                _ => &views[&Image::Normals],
+            };
             let uniform = gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(shader.label()),
                 size: params.len() as u64,
@@ -238,25 +282,21 @@ impl ScreenPasses {
             });
             gpu.queue.write_buffer(&uniform, 0, &params);
             let before = reads.map_or(&self.blank, |image| &views[&image]);
-            let own =
-                [Resource::Uniform(&self.screen), Resource::Texture(distances), Resource::Texture(&normals)];
+            let screen = &self.screens[usize::from(is_half)];
+            let own = [Resource::Uniform(screen), Resource::Texture(distances), Resource::Texture(normals)];
             let passed = [Resource::Uniform(&uniform), Resource::Texture(before)];
             let groups =
                 [group(&gpu.device, &self.layouts[0], &own), group(&gpu.device, &self.layouts[1], &passed)];
-            let written = match writes {
-                Image::Picture => size,
-                Image::Distances(level) => level_size(guarded, level),
-                _ => guarded,
-            };
             steps.push(Step {
                 label: shader.label(),
                 target: views[&writes].clone(),
                 pipeline: self.pipeline(gpu, shader, writes),
                 groups,
-                size: written,
+                size: size_of(writes),
             });
         }
-        Plan { method: *method, size, guard, normals, depths, steps, picture }
+        let [normals, depths] = [Image::Normals, Image::Depths].map(|image| views[&image].clone());
+        Plan { view: *view, normals, depths, steps, picture }
     }
 
     fn pipeline(&mut self, gpu: &Gpu, shader: Shader, writes: Image) -> wgpu::RenderPipeline {

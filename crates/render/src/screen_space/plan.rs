@@ -6,6 +6,7 @@ use super::method::ScreenMethod;
 use super::uniforms::*;
 use crate::alchemy::AlchemyParams;
 use crate::bilateral::Bilateral;
+use crate::forward::GeometryTarget;
 use crate::gtao::GtaoParams;
 use crate::hbao::{HbaoParams, Horizon};
 use crate::obscurance::Obscurance;
@@ -20,6 +21,7 @@ const OBSCURANCE_WGSL: &str = include_str!("../obscurance.wgsl");
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum Shader {
     Distance,
+    Halve,
     Minify,
     Ssao,
     SsaoBlur,
@@ -37,8 +39,9 @@ pub(super) enum Shader {
 
 impl Shader {
     #[cfg(test)]
-    pub(super) const ALL: [Shader; 11] = [
+    pub(super) const ALL: [Shader; 12] = [
         Shader::Distance,
+        Shader::Halve,
         Shader::Minify,
         Shader::Ssao,
         Shader::SsaoBlur,
@@ -55,6 +58,7 @@ impl Shader {
     pub(super) fn label(self) -> &'static str {
         match self {
             Shader::Distance => "distances",
+            Shader::Halve => "half",
             Shader::Minify => "levels",
             Shader::Ssao | Shader::Alchemy | Shader::Sao { .. } | Shader::Hbao | Shader::Gtao => "samples",
             Shader::SsaoBlur | Shader::Bilateral | Shader::Reconstruct => "blur",
@@ -66,6 +70,7 @@ impl Shader {
     pub(super) fn module(self) -> (String, &'static str) {
         let (files, entry): (&[&str], _) = match self {
             Shader::Distance => (&[include_str!("wgsl/distance.wgsl")], "distance_fragment"),
+            Shader::Halve => (&[include_str!("wgsl/halve.wgsl")], "halve_fragment"),
             Shader::Minify => (&[include_str!("../sao/minify.wgsl")], "minify_fragment"),
             Shader::Ssao => (&[include_str!("../ssao/ssao.wgsl")], "ssao_fragment"),
             Shader::SsaoBlur => (&[include_str!("../ssao/blur.wgsl")], "blur_fragment"),
@@ -98,8 +103,14 @@ impl Shader {
 pub(super) enum Image {
     /// Depths of the geometry.
     Depths,
-    /// A level of the distances.
+    /// Normals of the geometry.
+    Normals,
+    /// Distances of all samples, where the method sees half of the resolution.
+    FullDistances,
+    /// A level of the distances that the method sees.
     Distances(u32),
+    /// Normals at half resolution.
+    HalfNormals,
     /// One value a sample, in turns.
     Value(usize),
     /// Value and distance in bytes, in turns.
@@ -111,8 +122,9 @@ pub(super) enum Image {
 impl Image {
     pub(super) fn format(self) -> wgpu::TextureFormat {
         match self {
-            Image::Depths => wgpu::TextureFormat::Depth32Float,
-            Image::Distances(_) => wgpu::TextureFormat::R32Float,
+            Image::Depths => GeometryTarget::DEPTH_FORMAT,
+            Image::Distances(_) | Image::FullDistances => wgpu::TextureFormat::R32Float,
+            Image::Normals | Image::HalfNormals => GeometryTarget::NORMAL_FORMAT,
             Image::Value(_) => wgpu::TextureFormat::R16Float,
             Image::Packed(_) => wgpu::TextureFormat::Rgba8Unorm,
             Image::Picture => wgpu::TextureFormat::Rg16Float,
@@ -145,9 +157,26 @@ pub(super) fn levels(method: &ScreenMethod, size: (u32, u32)) -> u32 {
     params.levels.min(longest.next_power_of_two().ilog2())
 }
 
+/// Columns and rows that a method sees of a picture.
+pub(super) fn seen_size(size: (u32, u32), half_resolution: bool) -> (u32, u32) {
+    if half_resolution { level_size(size, 1) } else { size }
+}
+
 /// All passes of a method over a picture of this size, the guard band included, whose samples on each side are `guard`.
-pub(super) fn passes(method: &ScreenMethod, size: (u32, u32), guard: u32) -> Vec<Pass> {
-    let mut all = vec![pass(Shader::Distance, Some(Image::Depths), Image::Distances(0), [0.0f32; 4])];
+pub(super) fn passes(
+    method: &ScreenMethod,
+    full_size: (u32, u32),
+    guard: u32,
+    half_resolution: bool,
+) -> Vec<Pass> {
+    let distances = if half_resolution { Image::FullDistances } else { Image::Distances(0) };
+    let mut all = vec![pass(Shader::Distance, Some(Image::Depths), distances, [0.0f32; 4])];
+    if half_resolution {
+        let params = HalveUniform { full_size: [full_size.0 as i32, full_size.1 as i32], pad: [0.0; 2] };
+        all.push(pass(Shader::Halve, Some(Image::FullDistances), Image::Distances(0), params));
+        all.push(pass(Shader::Halve, Some(Image::Normals), Image::HalfNormals, params));
+    }
+    let size = seen_size(full_size, half_resolution);
     let last = match method {
         ScreenMethod::Ssao(params) => ssao(params, &mut all),
         ScreenMethod::Alchemy(params) => alchemy(params, &mut all),
@@ -155,7 +184,8 @@ pub(super) fn passes(method: &ScreenMethod, size: (u32, u32), guard: u32) -> Vec
         ScreenMethod::Hbao(params) => hbao(params, &mut all),
         ScreenMethod::Gtao(params) => gtao(params, &mut all),
     };
-    let params = PlaceUniform { guard: [guard as i32; 2], pad: [0.0; 2] };
+    let is_half = u32::from(half_resolution);
+    let params = PlaceUniform { guard: [guard as i32; 2], is_half, pad: 0.0 };
     all.push(pass(Shader::Place, Some(last), Image::Picture, params));
     all
 }

@@ -12,11 +12,13 @@ use glam::Vec3;
 
 use super::plan::Shader;
 use super::uniforms::*;
-use super::{ScreenKind, ScreenMethod, ScreenPasses};
+use super::{ScreenKind, ScreenMethod, ScreenPasses, ScreenView};
 use crate::forward::{Forward, GpuScene, GpuSceneOptions, LookupId};
+use crate::gbuffer::GuardBand;
 use crate::sao::{MipFilter, SaoParams};
 use crate::testing::Stage;
-use crate::testing::screen::{draw, look, still_life};
+use crate::testing::screen::{look, still_life};
+use crate::upsample::at_half_resolution;
 
 #[test]
 fn every_pass_is_valid_and_within_webgl2() {
@@ -43,7 +45,7 @@ fn uniforms_are_laid_out_as_in_the_shaders() {
         check_struct(&module, name, size, members).unwrap();
     };
     let members = members!(ScreenUniform: view_from_world_x view_from_world_y view_from_world_z half_extent size
-        is_parallel align depth samples_per_metre pad pad_b);
+        span is_parallel is_half depth samples_per_metre pad);
     check(Shader::Distance, "Screen", size_of::<ScreenUniform>(), &members);
     let members = members!(BilateralUniform: axis taps stride tolerance_m inverse_sigma pad);
     check(Shader::Bilateral, "BilateralParams", size_of::<BilateralUniform>(), &members);
@@ -62,7 +64,9 @@ fn uniforms_are_laid_out_as_in_the_shaders() {
     check(Shader::Ssao, "SsaoParams", size_of::<SsaoUniform>(), &members);
     let members = members!(BlurUniform: axis half_width inverse_sigma middle pad_a pad_b);
     check(Shader::SsaoBlur, "BlurParams", size_of::<BlurUniform>(), &members);
-    let members = members!(PlaceUniform: guard pad);
+    let members = members!(HalveUniform: full_size pad);
+    check(Shader::Halve, "HalveParams", size_of::<HalveUniform>(), &members);
+    let members = members!(PlaceUniform: guard is_half pad);
     check(Shader::Place, "PlaceParams", size_of::<PlaceUniform>(), &members);
 }
 
@@ -86,21 +90,30 @@ impl Bench {
     }
 
     /// Visibility and distance of each pixel.
-    fn run(
-        &mut self,
-        camera: &PosedCamera,
-        size: (u32, u32),
-        method: &ScreenMethod,
-        guard: u32,
-    ) -> Vec<[f32; 2]> {
+    fn run(&mut self, view: &ScreenView) -> Vec<[f32; 2]> {
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let Bench { gpu, pose, scene, forward, passes } = self;
-        passes.draw(gpu, &mut encoder, forward, scene, pose, camera, size, method, guard).unwrap();
+        passes.draw(gpu, &mut encoder, forward, scene, pose, view).unwrap();
         gpu.queue.submit([encoder.finish()]);
         let bytes = block_on(read_texture(gpu, passes.picture().unwrap(), 0)).unwrap();
         let half = |bytes: &[u8]| half_to_f32(u16::from_le_bytes([bytes[0], bytes[1]]));
         bytes.chunks_exact(4).map(|texel| [half(&texel[..2]), half(&texel[2..])]).collect()
     }
+}
+
+/// The same by the twins, and the distances of the picture.
+fn twin(stage: &Stage, view: &ScreenView) -> (Vec<f32>, Vec<f32>) {
+    let size = [view.size.0, view.size.1];
+    let wide = view.guard.rasterize(&stage.scene, &stage.pose, &view.camera, size, 1).unwrap();
+    let camera = view.guard.camera(&view.camera, size[1]);
+    let screen = wide.screen(&stage.scene, &stage.pose, &camera).unwrap();
+    let values = if view.half_resolution {
+        at_half_resolution(&screen, |half| view.method.estimate_visibility(half)).unwrap()
+    } else {
+        view.method.estimate_visibility(&screen).unwrap()
+    };
+    let crop = |values: &[f32]| view.guard.crop(values, size, 1).unwrap();
+    (crop(&values), crop(screen.distances_m()))
 }
 
 fn half_to_f32(bits: u16) -> f32 {
@@ -137,50 +150,53 @@ fn methods() -> Vec<ScreenMethod> {
 
 #[test]
 fn card_and_twin_agree() {
-    let scene = still_life();
-    let Some(mut bench) = Bench::new(&scene) else { return };
+    let stage = still_life();
+    let Some(mut bench) = Bench::new(&stage) else { return };
+    let guards = [GuardBand::default(), GuardBand::of_height(0.2, 37).unwrap()];
     for camera in cameras() {
-        for size in [[160, 120], [61, 37]] {
-            let (_, screen) = draw(&scene, &camera, size);
-            for method in methods() {
-                let twin = method.estimate_visibility(&screen).unwrap();
-                let card = bench.run(&camera, (size[0], size[1]), &method, 0);
-                let (mut seen, mut within, mut sum) = (0, 0, 0.0);
-                for ((twin, card), distance) in twin.iter().zip(&card).zip(screen.distances_m()) {
-                    // An edge may fall to the other side.
-                    if distance.is_finite() != (card[1] < 59_000.0) {
-                        continue;
-                    }
-                    let off = f64::from((twin - card[0]).abs());
-                    seen += 1;
-                    within += usize::from(off <= 3.0 / 255.0);
-                    sum += off;
-                    if !distance.is_finite() {
-                        assert_eq!(card[0], 1.0, "{method:?}: the background is open");
-                    }
+        let cases =
+            [((160, 120), guards[0], false), ((61, 37), guards[1], false), ((61, 37), guards[0], true)];
+        let cases = cases.into_iter().chain([((160, 120), guards[1], true)]);
+        for ((size, guard, half_resolution), method) in
+            cases.flat_map(|case| methods().into_iter().map(move |method| (case, method)))
+        {
+            let view = ScreenView { camera, size, method, guard, half_resolution };
+            let (twin, distances_m) = twin(&stage, &view);
+            let card = bench.run(&view);
+            let (mut seen, mut within, mut sum) = (0, 0, 0.0);
+            for ((twin, card), distance) in twin.iter().zip(&card).zip(&distances_m) {
+                // An edge may fall to the other side.
+                if distance.is_finite() != (card[1] < 59_000.0) {
+                    continue;
                 }
-                let (part, mean) = (within as f64 / f64::from(seen), sum / f64::from(seen));
-                eprintln!(
-                    "{} {size:?} {:?}: {part:.4} within, mean {mean:.5}",
-                    method.kind().name(),
-                    camera.projection
-                );
-                assert!(seen > size[0] * size[1] * 99 / 100, "{method:?}: {seen}");
-                assert!(part > 0.995 && mean < 0.001, "{method:?} {size:?}: {part}, {mean}");
+                let off = f64::from((twin - card[0]).abs());
+                seen += 1;
+                within += usize::from(off <= 3.0 / 255.0);
+                sum += off;
+                if !distance.is_finite() {
+                    assert_eq!(card[0], 1.0, "{method:?}: the background is open");
+                }
             }
+            let (part, mean) = (within as f64 / f64::from(seen), sum / f64::from(seen));
+            let name = method.kind().name();
+            let case = format!("{name} {size:?} {guard:?} half {half_resolution} {:?}", camera.projection);
+            eprintln!("{case}: {part:.4} within, mean {mean:.5}");
+            assert!(seen > size.0 * size.1 * 99 / 100, "{method:?}: {seen}");
+            assert!(part > 0.993 && mean < 0.001, "{case}, {method:?}: {part}, {mean}");
         }
     }
 }
 
 #[test]
 fn tiny_pictures_and_guard_bands_are_drawn() {
-    let scene = still_life();
-    let Some(mut bench) = Bench::new(&scene) else { return };
+    let stage = still_life();
+    let Some(mut bench) = Bench::new(&stage) else { return };
     for camera in cameras() {
         for method in methods() {
             for size in [(1, 1), (2, 1), (1, 3), (5, 7)] {
-                for guard in [0, 1, 5] {
-                    let card = bench.run(&camera, size, &method, guard);
+                for (part, half_resolution) in [(0.0, false), (0.2, true), (0.5, false), (0.0, true)] {
+                    let guard = GuardBand::of_height(part, size.1).unwrap();
+                    let card = bench.run(&ScreenView { camera, size, method, guard, half_resolution });
                     assert_eq!(card.len() as u32, size.0 * size.1);
                     assert!(
                         card.iter().all(|[v, _]| (0.0..=1.0).contains(v)),

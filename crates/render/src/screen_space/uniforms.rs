@@ -13,12 +13,12 @@ pub(super) struct ScreenUniform {
     pub(super) view_from_world_z: [f32; 4],
     pub(super) half_extent: [f32; 2],
     pub(super) size: [u32; 2],
+    pub(super) span: [f32; 2],
     pub(super) is_parallel: u32,
-    pub(super) align: u32,
+    pub(super) is_half: u32,
     pub(super) depth: [f32; 2],
     pub(super) samples_per_metre: f32,
     pub(super) pad: f32,
-    pub(super) pad_b: [f32; 2],
 }
 
 impl ScreenUniform {
@@ -39,12 +39,23 @@ impl ScreenUniform {
             view_from_world_z: z,
             half_extent: [(half_height * aspect) as f32, half_height as f32],
             size: [size.0, size.1],
+            span: [size.0 as f32, size.1 as f32],
             is_parallel: u32::from(is_parallel),
-            align: 0,
+            is_half: 0,
             depth,
             samples_per_metre: 0.5 * size.1 as f32 / half_height as f32,
             pad: 0.0,
-            pad_b: [0.0; 2],
+        }
+    }
+
+    /// Of the same picture at half the resolution.
+    pub(super) fn half(self) -> ScreenUniform {
+        ScreenUniform {
+            size: self.size.map(|side| side.div_ceil(2)),
+            span: self.span.map(|side| 0.5 * side),
+            is_half: 1,
+            samples_per_metre: 0.5 * self.samples_per_metre,
+            ..self
         }
     }
 }
@@ -154,5 +165,14 @@ pub(super) struct BlurUniform {
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(super) struct PlaceUniform {
     pub(super) guard: [i32; 2],
+    pub(super) is_half: u32,
+    pub(super) pad: f32,
+}
+
+/// `HalveParams` in `halve.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct HalveUniform {
+    pub(super) full_size: [i32; 2],
     pub(super) pad: [f32; 2],
 }

@@ -23,8 +23,7 @@ fn sample_at(place: vec3<f32>) -> vec2<i32> {
         }
         scale = -1.0 / place.z;
     }
-    let part = vec2(0.5) + vec2(0.5, -0.5) * place.xy * scale / screen.half_extent;
-    return vec2<i32>(floor(clamp(part, vec2(-1.0), vec2(2.0)) * vec2<f32>(screen.size)));
+    return sample_in((vec2(0.5) + vec2(0.5, -0.5) * place.xy * scale / screen.half_extent) * screen.span);
 }
 
 // The unit vector of a plane that is nearest to `turn`.

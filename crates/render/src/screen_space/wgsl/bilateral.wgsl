@@ -15,6 +15,9 @@ struct BilateralParams {
 
 @group(1) @binding(0) var<uniform> params: BilateralParams;
 
+// A slope is gentler than another if it is less than this part of it.
+const MUCH_GENTLER: f32 = 0.9;
+
 @fragment
 fn bilateral_fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
     let at = vec2<i32>(position.xy);
@@ -23,7 +26,7 @@ fn bilateral_fragment(@builtin(position) position: vec4<f32>) -> @location(0) ve
     if is_background(distance) || params.taps == 0u {
         return vec4(value);
     }
-    // The gentler of the slopes to both sides: the other may lead over an edge.
+    // The gentler of the slopes to both sides: the other may lead over an edge. Of two that are about alike the first, so that rounding decides nothing.
     var slope = 0.0;
     var gentlest = BACKGROUND_M;
     for (var side = -1; side <= 1; side += 2) {
@@ -33,7 +36,7 @@ fn bilateral_fragment(@builtin(position) position: vec4<f32>) -> @location(0) ve
             let steep = (found - distance) * f32(side);
             if !is_background(found) && abs(steep) < gentlest {
                 slope = steep;
-                gentlest = abs(steep);
+                gentlest = MUCH_GENTLER * abs(steep);
             }
         }
     }

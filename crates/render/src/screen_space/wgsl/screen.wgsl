@@ -9,14 +9,16 @@ struct Screen {
     half_extent: vec2<f32>,
     // Columns and rows.
     size: vec2<u32>,
+    // The picture's width and height in samples: less than columns and rows where the last ones reach beyond it.
+    span: vec2<f32>,
     is_parallel: u32,
-    align: u32,
+    // Whether each sample is one of a square of four, of a picture with twice as many columns and rows.
+    is_half: u32,
     // Perspective: the near plane and 0. Parallel: the far plane, and how far it is behind the near one.
     depth: vec2<f32>,
     // Samples of the picture in a metre across the view axis: at distance 1 (perspective) or anywhere (parallel).
     samples_per_metre: f32,
     pad: f32,
-    pad_b: vec2<f32>,
 }
 
 @group(0) @binding(0) var<uniform> screen: Screen;
@@ -47,9 +49,22 @@ fn is_inside(at: vec2<i32>) -> bool {
     return all(at >= vec2(0)) && all(at < vec2<i32>(screen.size));
 }
 
+// Of a square of 2 × 2 the sample that a picture of half the resolution has: another in each row and column ([McGuire2012] Table 1, rotated grid).
+fn chosen_of_four(at: vec2<i32>, full_size: vec2<i32>) -> vec2<i32> {
+    return min(at * 2 + ((at.yx & vec2(1)) ^ vec2(1)), full_size - 1);
+}
+
+// The point of the picture that a sample is of.
+fn centre(at: vec2<i32>) -> vec2<f32> {
+    if screen.is_half == 0u {
+        return vec2<f32>(at) + 0.5;
+    }
+    return 0.5 * vec2<f32>(chosen_of_four(at, vec2<i32>(2.0 * screen.span))) + 0.25;
+}
+
 // The place at a distance that a point of the picture shows; the first sample's centre is at (0.5, 0.5).
 fn place_view(point: vec2<f32>, distance: f32) -> vec3<f32> {
-    let across = vec2(2.0, -2.0) * point / vec2<f32>(screen.size) + vec2(-1.0, 1.0);
+    let across = vec2(2.0, -2.0) * point / screen.span + vec2(-1.0, 1.0);
     let scale = select(distance, 1.0, screen.is_parallel != 0u);
     return vec3(across * screen.half_extent * scale, -distance);
 }
@@ -63,7 +78,7 @@ fn place_at(at: vec2<i32>) -> vec4<f32> {
     if is_background(distance) {
         return vec4(0.0);
     }
-    return vec4(place_view(vec2<f32>(at) + 0.5, distance), 1.0);
+    return vec4(place_view(centre(at), distance), 1.0);
 }
 
 // A sample's unit normal in view space; zero where it has none.
@@ -79,11 +94,18 @@ fn normal_at(at: vec2<i32>) -> vec3<f32> {
     return normalize(vec3(x, y, z));
 }
 
+// The sample that a point of the picture lies in; one outside where that is outside.
+fn sample_in(point: vec2<f32>) -> vec2<i32> {
+    // Not a number is outside, too.
+    if all(point >= vec2(0.0)) && all(point < screen.span) {
+        return vec2<i32>(point);
+    }
+    return vec2(-1);
+}
+
 // The sample that lies so many to the right and down of another's centre.
 fn neighbour(at: vec2<i32>, by: vec2<f32>) -> vec2<i32> {
-    // Far outside no integer would hold it.
-    let reach = vec2<f32>(screen.size) + 2.0;
-    return vec2<i32>(floor(clamp(vec2<f32>(at) + 0.5 + by, -reach, 2.0 * reach)));
+    return sample_in(centre(at) + by);
 }
 
 fn samples_per_metre(distance: f32) -> f32 {
