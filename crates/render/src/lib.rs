@@ -31,6 +31,7 @@ pub mod hbao;
 pub mod image;
 pub mod psao;
 pub mod sao;
+pub mod sdao;
 pub mod shade;
 pub mod ssao;
 

@@ -20,7 +20,7 @@ pub struct Screen {
 
 /// How view space falls on the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Lens {
+pub(super) struct Lens {
     /// Half the picture's width and height: at distance 1 for a perspective, anywhere for a parallel camera.
     half_extent: [f32; 2],
     is_perspective: bool,
@@ -60,7 +60,7 @@ impl GBuffer {
 }
 
 impl Lens {
-    fn new(projection: &Projection, aspect: f64) -> Lens {
+    pub(super) fn new(projection: &Projection, aspect: f64) -> Lens {
         let (half_height, is_perspective) = match *projection {
             Projection::Perspective { yfov, .. } => (libm::tan(0.5 * f64::from(yfov)), true),
             Projection::Orthographic { half_height, .. } => (f64::from(half_height), false),
@@ -70,6 +70,13 @@ impl Lens {
 }
 
 impl Screen {
+    /// A picture of which distances are known and normals are not: they are zero.
+    pub(super) fn without_normals(lens: Lens, columns: u32, distances_m: Vec<f32>) -> Screen {
+        let rows = (distances_m.len() / columns as usize) as u32;
+        let normals_view = vec![Vec3::ZERO; distances_m.len()];
+        Screen { columns, rows, lens, distances_m, normals_view }
+    }
+
     /// Samples in a row.
     pub fn columns(&self) -> u32 {
         self.columns
@@ -137,7 +144,11 @@ impl Screen {
 
     /// The sample that lies so many to the right and down of another's centre; `None` outside of the picture.
     pub fn neighbour(&self, [column, row]: [usize; 2], by: [f32; 2]) -> Option<[usize; 2]> {
-        let (column, row) = (column as f32 + 0.5 + by[0], row as f32 + 0.5 + by[1]);
+        self.sample_in([column as f32 + 0.5 + by[0], row as f32 + 0.5 + by[1]])
+    }
+
+    /// The sample that a point of the picture lies in; `None` outside of the picture. Coordinates as of [`Screen::place_view`].
+    pub fn sample_in(&self, [column, row]: [f32; 2]) -> Option<[usize; 2]> {
         // Not a number is outside, too.
         let inside = column >= 0.0 && column < self.columns as f32 && row >= 0.0 && row < self.rows as f32;
         inside.then_some([column as usize, row as usize])
@@ -161,6 +172,12 @@ impl Screen {
 
     /// Index of the sample whose square of the picture a place falls on; `None` outside of the picture and behind the camera.
     pub fn sample_at(&self, position_view: Vec3) -> Option<usize> {
+        let [column, row] = self.sample_in(self.point_of(position_view)?)?;
+        Some(row * self.columns as usize + column)
+    }
+
+    /// The point of the picture, or beside it, that a place falls on; `None` behind the camera. Coordinates as of [`Screen::place_view`].
+    pub fn point_of(&self, position_view: Vec3) -> Option<[f32; 2]> {
         let distance = -position_view.z;
         let scale = match self.lens.is_perspective {
             true if distance > 0.0 => 1.0 / distance,
@@ -170,9 +187,7 @@ impl Screen {
         let [half_width, half_height] = self.lens.half_extent;
         let column = (0.5 + 0.5 * position_view.x * scale / half_width) * self.columns as f32;
         let row = (0.5 - 0.5 * position_view.y * scale / half_height) * self.rows as f32;
-        // Not a number is outside, too.
-        let inside = column >= 0.0 && column < self.columns as f32 && row >= 0.0 && row < self.rows as f32;
-        inside.then(|| row as usize * self.columns as usize + column as usize)
+        Some([column, row])
     }
 }
 
