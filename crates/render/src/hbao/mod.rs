@@ -9,7 +9,7 @@ use crate::RenderError;
 use crate::bilateral::Bilateral;
 use crate::gbuffer::Screen;
 use crate::noise::interleaved_gradient;
-use crate::sdao::Lookup;
+use crate::sdao::{Looks, Lookup};
 use glam::Vec3;
 
 /// Most directions, and most steps along each.
@@ -237,9 +237,13 @@ impl<'a> Estimator<'a> {
             };
             let first = self.to_first(centre, index);
             let seen = first.and_then(gain);
-            // The first surface decides where it is near, and under the horizon all behind it is, too.
-            let decides = |first: Vec3| self.weight(first).is_some() || first.z < sine * first.length();
-            let hidden = if self.lookup.is_efficient && first.is_some_and(decides) {
+            let is_under = |first: Vec3| first.z <= sine * first.length();
+            let is_decided = first.is_some_and(|first| match self.lookup.looks {
+                Looks::Everywhere => false,
+                Looks::WhereFirstIsFar => self.weight(first).is_some() || is_under(first),
+                Looks::WhereFirstRises => is_under(first),
+            });
+            let hidden = if is_decided {
                 None
             } else {
                 let gains = self.to_hidden(centre, index).filter_map(gain);
@@ -261,13 +265,17 @@ impl<'a> Estimator<'a> {
             let weight = self.weight(to_seen)?;
             Some(weight * (centre.normal.dot(to_seen) / to_seen.length() - self.sin_bias).max(0.0))
         };
-        let seen = self.to_first(centre, index).and_then(height);
-        match seen {
-            Some(seen) if self.lookup.is_efficient => seen,
-            seen => {
-                let hidden = self.to_hidden(centre, index).filter_map(height).fold(0.0, f32::max);
-                seen.unwrap_or(0.0).max(self.lookup.compensation * hidden)
-            }
+        let first = self.to_first(centre, index);
+        let seen = first.and_then(height);
+        let is_decided = first.is_some_and(|first| match self.lookup.looks {
+            Looks::Everywhere => false,
+            Looks::WhereFirstIsFar => seen.is_some(),
+            Looks::WhereFirstRises => centre.normal.dot(first) <= self.sin_bias * first.length(),
+        });
+        if is_decided {
+            return seen.unwrap_or(0.0);
         }
+        let hidden = self.to_hidden(centre, index).filter_map(height).fold(0.0, f32::max);
+        seen.unwrap_or(0.0).max(self.lookup.compensation * hidden)
     }
 }

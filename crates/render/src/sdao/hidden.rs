@@ -18,32 +18,49 @@ pub enum Hidden<'a> {
     Peeled(&'a Layers),
 }
 
+/// At which samples of the picture an estimator looks at hidden surfaces, too.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Looks {
+    /// Everywhere.
+    Everywhere,
+    /// Where the first surface is too far away to count, and, for HBAO, over the horizon (\[Vermeer2021\] sec. 3.3 and Alg. 2).
+    WhereFirstIsFar,
+    /// Where the first surface stands over the plane of the centre (for HBAO, over the horizon): what lies behind one that does not is lower still.
+    #[default]
+    WhereFirstRises,
+}
+
 /// What an estimator makes of hidden surfaces.
 #[derive(Clone, Copy, Debug)]
 pub struct Lookup<'a> {
     /// Which there are; default none.
     pub hidden: Hidden<'a>,
-    /// Whether they are left alone where the first surface is near enough to count (\[Vermeer2021\] sec. 3.3); default true.
-    pub is_efficient: bool,
+    /// Where they are looked at. SSAO looks where the first surface does not block, whatever this is: elsewhere they change nothing.
+    pub looks: Looks,
     /// What occlusion by hidden surfaces is multiplied by, 0 … 16; default 1. Sec. 4 doubles it, for samples that miss occluders.
     pub compensation: f32,
 }
 
 impl Default for Lookup<'_> {
     fn default() -> Self {
-        Lookup { hidden: Hidden::Nothing, is_efficient: true, compensation: 1.0 }
+        Lookup { hidden: Hidden::Nothing, looks: Looks::default(), compensation: 1.0 }
     }
 }
 
 impl<'a> Lookup<'a> {
-    /// A stochastic map's surfaces, as the paper looks at them.
+    /// A stochastic map's surfaces.
     pub fn stochastic(map: &'a StochasticMap) -> Lookup<'a> {
         Lookup { hidden: Hidden::Stochastic(map), ..Lookup::default() }
     }
 
+    /// The same as sec. 3.3 looks at them.
+    pub fn paper(map: &'a StochasticMap) -> Lookup<'a> {
+        Lookup { looks: Looks::WhereFirstIsFar, ..Lookup::stochastic(map) }
+    }
+
     /// All surfaces at every step: the reference.
     pub fn peeled(layers: &'a Layers) -> Lookup<'a> {
-        Lookup { hidden: Hidden::Peeled(layers), is_efficient: false, ..Lookup::default() }
+        Lookup { hidden: Hidden::Peeled(layers), looks: Looks::Everywhere, ..Lookup::default() }
     }
 
     /// Whether it belongs to a picture, and its numbers are in range.

@@ -12,11 +12,11 @@ use crate::{RenderError, projection};
 pub struct MapParams {
     /// Distances kept for a sample of the picture, 1, 2, 4, 8 or 16; default 4 \[S\].
     pub samples: u32,
-    /// Part of them that a surface is expected to be kept in, above 0 to 1; default 0.2 \[α\].
+    /// Part of them that a surface is expected to be kept in, above 0 to 1; default 0.25 \[α\].
     pub alpha: f32,
     /// How those are chosen; default stratified.
     pub picks: Picks,
-    /// Whether the first surface, which the G-buffer has, is left out, so that samples are free for others; default false, as in the paper.
+    /// Whether the first surface, which the G-buffer has, is left out, so that samples are free for others; default true.
     pub is_first_left_out: bool,
     /// Of what is random; any, default 0.
     pub seed: u32,
@@ -24,7 +24,21 @@ pub struct MapParams {
 
 impl Default for MapParams {
     fn default() -> Self {
-        MapParams { samples: 4, alpha: 0.2, picks: Picks::Stratified, is_first_left_out: false, seed: 0 }
+        MapParams::with_samples(4)
+    }
+}
+
+impl MapParams {
+    /// What removes most of the error with so many samples: the first surface is left out, and each other one kept in one sample, so that the second is always
+    /// there; in a quarter of 8 or 16.
+    pub fn with_samples(samples: u32) -> MapParams {
+        let alpha = (1.0 / samples.max(1) as f32).max(0.25);
+        MapParams { samples, alpha, picks: Picks::Stratified, is_first_left_out: true, seed: 0 }
+    }
+
+    /// As in \[Vermeer2021\] sec. 4: α is 0.2, and the first surface is one among the others.
+    pub fn paper(samples: u32) -> MapParams {
+        MapParams { alpha: 0.2, is_first_left_out: false, ..MapParams::with_samples(samples) }
     }
 }
 

@@ -4,10 +4,12 @@
 
 mod hidden;
 mod map;
+#[cfg(test)]
+mod measure;
 mod picks;
 #[cfg(test)]
 mod tests;
 
-pub use hidden::{Hidden, Lookup};
+pub use hidden::{Hidden, Looks, Lookup};
 pub use map::{MapParams, StochasticMap};
 pub use picks::Picks;

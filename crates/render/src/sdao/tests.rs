@@ -111,7 +111,7 @@ fn layers_are_kept_as_often_as_chance_says_and_no_oftener() {
         SIZES.into_iter().flat_map(|s| [(s, Picks::Stratified, 0.2), (s, Picks::Independent, 0.4)])
     {
         for is_first_left_out in [false, true] {
-            let params = MapParams { samples, picks, alpha, is_first_left_out, ..MapParams::default() };
+            let params = MapParams { picks, alpha, is_first_left_out, ..MapParams::paper(samples) };
             let map = StochasticMap::draw(&stage.scene, &stage.pose, &camera, &gbuffer, &params).unwrap();
             let mut kept = [0u32; 6];
             for distance in (0..120 * 100).flat_map(|i| map.distances_m(i)) {
@@ -145,8 +145,7 @@ fn drawing_is_choosing_from_all_layers() {
         let gbuffer = rasterize(&stage.scene, &stage.pose, &camera, 47, 33, n).unwrap();
         let layers = Layers::draw(&stage.scene, &stage.pose, &camera, 47, 33, n).unwrap();
         for (samples, is_first_left_out) in SIZES.into_iter().flat_map(|s| [(s, false), (s, true)]) {
-            let params =
-                MapParams { samples, is_first_left_out, alpha: 0.4, seed: 9, ..MapParams::default() };
+            let params = MapParams { is_first_left_out, alpha: 0.4, seed: 9, ..MapParams::paper(samples) };
             let drawn =
                 || StochasticMap::draw(&stage.scene, &stage.pose, &camera, &gbuffer, &params).unwrap();
             let map = with_threads(1, drawn);
@@ -243,17 +242,17 @@ fn a_hidden_occluder_is_found_the_oftener_the_more_samples_there_are() {
         let single = mean(&Lookup::default());
         let peeled = mean(&Lookup::peeled(&layers));
         let found = SIZES.map(|samples| {
-            let params = MapParams { samples, ..MapParams::default() };
+            let params = MapParams::paper(samples);
             let map = StochasticMap::of_layers(&layers, &camera.projection, &params).unwrap();
-            mean(&Lookup::stochastic(&map))
+            mean(&Lookup::paper(&map))
         });
         println!("{name}: {single}, {found:?}, {peeled}");
         assert!(single > 0.995 && peeled < 0.97, "{name}: {single}, {peeled}");
         assert!(found[0] < single && found.windows(2).all(|pair| pair[1] < pair[0]), "{name}: {found:?}");
         assert!((found[4] - peeled).abs() < 0.15 * (single - peeled), "{name}: {found:?}, {peeled}");
         // With the first surface left out, one sample of four always has the second.
-        let params = MapParams { alpha: 0.25, is_first_left_out: true, ..MapParams::default() };
-        let map = StochasticMap::draw(&stage.scene, &stage.pose, &camera, &gbuffer, &params).unwrap();
+        let map =
+            StochasticMap::draw(&stage.scene, &stage.pose, &camera, &gbuffer, &MapParams::default()).unwrap();
         let second = mean(&Lookup::stochastic(&map));
         assert!((second - peeled).abs() < 0.05 * (single - peeled), "{name}: {second}, {peeled}");
     }
