@@ -77,6 +77,12 @@ impl Screen {
         Screen { columns, rows, lens, distances_m, normals_view }
     }
 
+    /// A picture on which nothing is seen.
+    pub(crate) fn of_nothing(camera: &PosedCamera, [columns, rows]: [u32; 2]) -> Screen {
+        let lens = Lens::new(&camera.projection, f64::from(columns) / f64::from(rows));
+        Screen::without_normals(lens, columns, vec![f32::INFINITY; columns as usize * rows as usize])
+    }
+
     /// Samples in a row.
     pub fn columns(&self) -> u32 {
         self.columns
@@ -162,6 +168,11 @@ impl Screen {
     /// The way from a place to the eye, a unit vector.
     pub fn towards_eye(&self, place_view: Vec3) -> Vec3 {
         if self.lens.is_perspective { (-place_view).normalize_or(Vec3::Z) } else { Vec3::Z }
+    }
+
+    /// Whether the ray of the picture that goes to a place falls in front of its plane with a normal, so that it goes on behind it.
+    pub(crate) fn falls_on(&self, place_view: Vec3, normal_view: Vec3) -> bool {
+        if self.lens.is_perspective { normal_view.dot(place_view) <= 0.0 } else { normal_view.z >= 0.0 }
     }
 
     /// How many samples of the picture a metre across the view axis is long at a distance. Samples are taken to be square.

@@ -270,7 +270,11 @@ impl<'a> Estimator<'a> {
         let is_decided = first.is_some_and(|first| match self.lookup.looks {
             Looks::Everywhere => false,
             Looks::WhereFirstIsFar => seen.is_some(),
-            Looks::WhereFirstRises => centre.normal.dot(first) <= self.sin_bias * first.length(),
+            // Rays that come from below the plane may still rise over it.
+            Looks::WhereFirstRises => {
+                centre.normal.dot(first) <= self.sin_bias * first.length()
+                    && self.screen.falls_on(centre.place + first, centre.normal)
+            }
         });
         if is_decided {
             return seen.unwrap_or(0.0);

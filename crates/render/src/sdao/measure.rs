@@ -50,6 +50,9 @@ fn scenes() -> Vec<(String, Scene, String)> {
     scenes
 }
 
+/// Visibility by a method.
+type Method = fn(&Screen, &Lookup<'_>) -> Vec<f32>;
+
 /// One picture of a scene with all that is known of it.
 struct View<'a> {
     scene: &'a Scene,
@@ -118,7 +121,7 @@ fn ways() -> Vec<Way> {
 #[test]
 #[ignore = "prints, asserts nothing"]
 fn error_to_the_depth_peeled_limit() {
-    let methods: [(&str, fn(&Screen, &Lookup<'_>) -> Vec<f32>); 3] = [
+    let methods: [(&str, Method); 3] = [
         ("hbao-plus", |s, l| hbao::estimate_visibility_with(s, &HbaoParams::hbao_plus(), l).unwrap()),
         ("hbao", |s, l| hbao::estimate_visibility_with(s, &HbaoParams::hbao(), l).unwrap()),
         ("ssao", |s, l| ssao::estimate_visibility_with(s, &SsaoParams::default(), l).unwrap()),

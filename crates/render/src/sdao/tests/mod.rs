@@ -1,4 +1,7 @@
-//! The map has the paper's statistics, and hidden occluders are found.
+//! The map has the paper's statistics; hidden occluders are found; methods keep the rules of screen-space methods.
+
+mod hidden;
+mod two_cameras;
 
 use dapple_scene::{PosedCamera, Projection};
 use glam::{Affine3A, Vec3};
@@ -6,12 +9,12 @@ use glam::{Affine3A, Vec3};
 use super::picks::{Chooser, Subsets};
 use super::*;
 use crate::RenderError;
-use crate::gbuffer::{GBuffer, Layers, Screen, rasterize};
+use crate::gbuffer::{Layers, Screen, rasterize};
 use crate::hbao::{self, HbaoParams};
 use crate::noise::hash;
 use crate::ssao::{self, SsaoParams};
 use crate::testing::screen::{draw, look, still_life};
-use crate::testing::{Stage, cube, ground, quad, with_threads};
+use crate::testing::{Stage, quad, with_threads};
 
 const SIZES: [u32; 5] = [1, 2, 4, 8, 16];
 
@@ -193,67 +196,5 @@ fn parameters_out_of_range_are_named() {
         for error in [hbao(&screen, &lookup), ssao(&screen, &lookup)] {
             assert!(matches!(error, Err(RenderError::Parameter { name: "sdao: compensation", .. })));
         }
-    }
-}
-
-/// Ground, a box of half a metre on it, and a thin pillar near the eye that hides all of the box.
-fn behind_a_pillar() -> (Stage, PosedCamera) {
-    let mut stage = Stage::new();
-    let block = |center: Vec3, half: Vec3| Affine3A::from_translation(center) * Affine3A::from_scale(half);
-    stage.add(ground(30.0), 0, Affine3A::IDENTITY);
-    stage.add(cube(), 0, block(Vec3::new(0.0, 0.25, -6.0), Vec3::splat(0.25)));
-    stage.add(cube(), 0, block(Vec3::new(0.0, 1.2, -2.0), Vec3::new(0.12, 1.2, 0.1)));
-    (stage, look(Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.3, -6.0)))
-}
-
-/// Mean of a value a sample over the ground beside the hidden box.
-fn beside_the_box(stage: &Stage, gbuffer: &GBuffer, values: &[f32]) -> f32 {
-    let is_there = |i: &usize| {
-        gbuffer.surface(&stage.scene, &stage.pose, *i).is_some_and(|surface| {
-            let at = surface.position_world;
-            surface.instance == 0 && (0.3..0.6).contains(&at.x.abs()) && (-6.2..-5.8).contains(&at.z)
-        })
-    };
-    let there: Vec<usize> = (0..values.len()).filter(is_there).collect();
-    assert!(there.len() > 100, "{}", there.len());
-    there.iter().map(|i| values[*i]).sum::<f32>() / there.len() as f32
-}
-
-/// What a lookup makes of a screen, by each of the methods.
-type Method = fn(&Screen, &Lookup<'_>) -> Vec<f32>;
-
-const METHODS: [(&str, Method); 3] = [
-    ("ssao", |screen, lookup| {
-        ssao::estimate_visibility_with(screen, &SsaoParams::default(), lookup).unwrap()
-    }),
-    ("hbao", |screen, lookup| hbao::estimate_visibility_with(screen, &HbaoParams::hbao(), lookup).unwrap()),
-    ("hbao-plus", |screen, lookup| {
-        hbao::estimate_visibility_with(screen, &HbaoParams::hbao_plus(), lookup).unwrap()
-    }),
-];
-
-#[test]
-fn a_hidden_occluder_is_found_the_oftener_the_more_samples_there_are() {
-    let (stage, camera) = behind_a_pillar();
-    let (gbuffer, screen) = draw(&stage, &camera, [640, 480]);
-    let layers = Layers::draw(&stage.scene, &stage.pose, &camera, 640, 480, 1).unwrap();
-    for (name, method) in METHODS {
-        let mean = |lookup: &Lookup<'_>| beside_the_box(&stage, &gbuffer, &method(&screen, lookup));
-        let single = mean(&Lookup::default());
-        let peeled = mean(&Lookup::peeled(&layers));
-        let found = SIZES.map(|samples| {
-            let params = MapParams::paper(samples);
-            let map = StochasticMap::of_layers(&layers, &camera.projection, &params).unwrap();
-            mean(&Lookup::paper(&map))
-        });
-        println!("{name}: {single}, {found:?}, {peeled}");
-        assert!(single > 0.995 && peeled < 0.97, "{name}: {single}, {peeled}");
-        assert!(found[0] < single && found.windows(2).all(|pair| pair[1] < pair[0]), "{name}: {found:?}");
-        assert!((found[4] - peeled).abs() < 0.15 * (single - peeled), "{name}: {found:?}, {peeled}");
-        // With the first surface left out, one sample of four always has the second.
-        let map =
-            StochasticMap::draw(&stage.scene, &stage.pose, &camera, &gbuffer, &MapParams::default()).unwrap();
-        let second = mean(&Lookup::stochastic(&map));
-        assert!((second - peeled).abs() < 0.05 * (single - peeled), "{name}: {second}, {peeled}");
     }
 }

@@ -1,0 +1,193 @@
+//! What is hidden is found, by all three methods, and what they keep to besides.
+
+use dapple_scene::PosedCamera;
+
+use super::*;
+use crate::gbuffer::GBuffer;
+use crate::testing::screen::{
+    Shot, check_golden_view_of, check_lenses_of, check_pictures_of, check_walls_of, corner_profile,
+    corner_profile_of,
+};
+use crate::testing::{cube, ground};
+
+/// Ground, a box of half a metre on it, and a thin pillar near the eye that hides all of the box.
+pub(super) fn behind_a_pillar() -> (Stage, PosedCamera) {
+    let mut stage = Stage::new();
+    let block = |center: Vec3, half: Vec3| Affine3A::from_translation(center) * Affine3A::from_scale(half);
+    stage.add(ground(30.0), 0, Affine3A::IDENTITY);
+    stage.add(cube(), 0, block(Vec3::new(0.0, 0.25, -6.0), Vec3::splat(0.25)));
+    stage.add(cube(), 0, block(Vec3::new(0.0, 1.2, -2.0), Vec3::new(0.12, 1.2, 0.1)));
+    (stage, look(Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.3, -6.0)))
+}
+
+/// Mean of a value a sample over the ground beside the hidden box.
+fn beside_the_box(stage: &Stage, gbuffer: &GBuffer, values: &[f32]) -> f32 {
+    let is_there = |i: &usize| {
+        gbuffer.surface(&stage.scene, &stage.pose, *i).is_some_and(|surface| {
+            let at = surface.position_world;
+            surface.instance == 0 && (0.3..0.6).contains(&at.x.abs()) && (-6.2..-5.8).contains(&at.z)
+        })
+    };
+    let there: Vec<usize> = (0..values.len()).filter(is_there).collect();
+    assert!(there.len() > 100, "{}", there.len());
+    there.iter().map(|i| values[*i]).sum::<f32>() / there.len() as f32
+}
+
+/// What a lookup makes of a screen, by each of the methods.
+type Method = fn(&Screen, &Lookup<'_>) -> Vec<f32>;
+
+const METHODS: [(&str, Method); 3] = [
+    ("ssao", |screen, lookup| {
+        ssao::estimate_visibility_with(screen, &SsaoParams::default(), lookup).unwrap()
+    }),
+    ("hbao", |screen, lookup| hbao::estimate_visibility_with(screen, &HbaoParams::hbao(), lookup).unwrap()),
+    ("hbao-plus", |screen, lookup| {
+        hbao::estimate_visibility_with(screen, &HbaoParams::hbao_plus(), lookup).unwrap()
+    }),
+];
+
+#[test]
+fn a_hidden_occluder_is_found_the_oftener_the_more_samples_there_are() {
+    let (stage, camera) = behind_a_pillar();
+    let (gbuffer, screen) = draw(&stage, &camera, [640, 480]);
+    let layers = Layers::draw(&stage.scene, &stage.pose, &camera, 640, 480, 1).unwrap();
+    for (name, method) in METHODS {
+        let mean = |lookup: &Lookup<'_>| beside_the_box(&stage, &gbuffer, &method(&screen, lookup));
+        let single = mean(&Lookup::default());
+        let peeled = mean(&Lookup::peeled(&layers));
+        let found = SIZES.map(|samples| {
+            let params = MapParams::paper(samples);
+            let map = StochasticMap::of_layers(&layers, &camera.projection, &params).unwrap();
+            mean(&Lookup::paper(&map))
+        });
+        println!("{name}: {single}, {found:?}, {peeled}");
+        assert!(single > 0.995 && peeled < 0.97, "{name}: {single}, {peeled}");
+        assert!(found[0] < single && found.windows(2).all(|pair| pair[1] < pair[0]), "{name}: {found:?}");
+        assert!((found[4] - peeled).abs() < 0.15 * (single - peeled), "{name}: {found:?}, {peeled}");
+        // With the first surface left out, one sample of four always has the second.
+        let map =
+            StochasticMap::draw(&stage.scene, &stage.pose, &camera, &gbuffer, &MapParams::default()).unwrap();
+        let second = mean(&Lookup::stochastic(&map));
+        assert!((second - peeled).abs() < 0.05 * (single - peeled), "{name}: {second}, {peeled}");
+    }
+}
+
+/// By a stochastic map of so many samples, or, for none, by all layers.
+fn estimate(method: Method, samples: u32) -> impl Fn(&Shot<'_>) -> Vec<f32> + Sync {
+    move |shot| {
+        let Shot { stage: Stage { scene, pose }, camera, gbuffer, screen } = shot;
+        if samples == 0 {
+            let [width, height, n] = [gbuffer.width, gbuffer.height, gbuffer.samples_per_axis];
+            let layers = Layers::draw(scene, pose, camera, width, height, n).unwrap();
+            return method(screen, &Lookup::peeled(&layers));
+        }
+        let params = MapParams::with_samples(samples);
+        let map = StochasticMap::draw(scene, pose, camera, gbuffer, &params).unwrap();
+        method(screen, &Lookup::stochastic(&map))
+    }
+}
+
+#[test]
+fn walls_are_open_pictures_are_pictures_and_lenses_agree() {
+    for (name, method) in METHODS {
+        for samples in [0, 1, 4, 16] {
+            println!("{name}, {samples} samples");
+            let estimate = estimate(method, samples);
+            check_walls_of(&estimate, 75.0, 0.99);
+            check_pictures_of(&estimate);
+            check_lenses_of(&estimate, 0.01);
+        }
+    }
+}
+
+#[test]
+fn a_corner_darkens_as_it_does_by_a_single_layer() {
+    // Nothing is hidden in it but the ground behind the wall.
+    for (_, method) in METHODS {
+        let alone = corner_profile(&|screen| method(screen, &Lookup::default()), 0.6);
+        for samples in [0, 4] {
+            let found = corner_profile_of(&estimate(method, samples), 0.6);
+            for (found, alone) in found.iter().zip(&alone) {
+                assert!((found[0] - alone[0]).abs() < 0.005, "{found:?}, {alone:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_map_of_nothing_else_is_a_single_layer_to_the_last_bit() {
+    // All that is behind the first surface of a lone wall is nothing; and a map of no weight is none.
+    let (stage, camera) = (still_life(), look(Vec3::new(3.2, 2.4, 1.8), Vec3::new(0.5, 0.5, 0.0)));
+    let (gbuffer, screen) = draw(&stage, &camera, [80, 60]);
+    let layers = Layers::draw(&stage.scene, &stage.pose, &camera, 80, 60, 1).unwrap();
+    let map = StochasticMap::draw(&stage.scene, &stage.pose, &camera, &gbuffer, &MapParams::with_samples(8))
+        .unwrap();
+    for (name, method) in &METHODS[..2] {
+        let alone = method(&screen, &Lookup::default());
+        let known = method(&screen, &Lookup::stochastic(&map));
+        assert_ne!(alone, known, "{name}");
+        assert_ne!(alone, method(&screen, &Lookup::peeled(&layers)), "{name}");
+    }
+    let method = METHODS[2].1;
+    let weightless = Lookup { compensation: 0.0, ..Lookup::stochastic(&map) };
+    assert_eq!(method(&screen, &Lookup::default()), method(&screen, &weightless));
+    let stage = walls(1);
+    let (gbuffer, screen) = draw(&stage, &ahead(), [33, 21]);
+    let map =
+        StochasticMap::draw(&stage.scene, &stage.pose, &ahead(), &gbuffer, &MapParams::paper(16)).unwrap();
+    for (name, method) in METHODS {
+        assert_eq!(
+            method(&screen, &Lookup::default()),
+            method(&screen, &Lookup { looks: Looks::Everywhere, ..Lookup::stochastic(&map) }),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn sixteen_samples_are_near_all_layers_and_looking_where_it_rises_loses_nothing() {
+    let (stage, camera) = (still_life(), look(Vec3::new(1.2, 0.6, 3.0), Vec3::new(0.6, 0.4, 0.0)));
+    let (gbuffer, screen) = draw(&stage, &camera, [160, 120]);
+    let layers = Layers::draw(&stage.scene, &stage.pose, &camera, 160, 120, 1).unwrap();
+    let map = StochasticMap::draw(&stage.scene, &stage.pose, &camera, &gbuffer, &MapParams::with_samples(16))
+        .unwrap();
+    for (name, method) in METHODS {
+        let peeled = method(&screen, &Lookup::peeled(&layers));
+        let off = |lookup: &Lookup<'_>| {
+            let found = method(&screen, lookup);
+            found.iter().zip(&peeled).map(|(a, b)| (a - b).abs()).sum::<f32>() / peeled.len() as f32
+        };
+        let single = off(&Lookup::default());
+        let (sampled, rises) = (
+            off(&Lookup::stochastic(&map)),
+            off(&Lookup { looks: Looks::WhereFirstRises, ..Lookup::peeled(&layers) }),
+        );
+        println!("{name}: {single}, {sampled}, {rises}");
+        assert!(single > 5e-4 && sampled < 0.1 * single && rises < 0.05 * single, "{name}");
+    }
+}
+
+#[test]
+fn compensation_multiplies_what_hidden_surfaces_block() {
+    let (stage, camera) = behind_a_pillar();
+    let (gbuffer, screen) = draw(&stage, &camera, [640, 480]);
+    let map = StochasticMap::draw(&stage.scene, &stage.pose, &camera, &gbuffer, &MapParams::with_samples(4))
+        .unwrap();
+    for (name, method) in METHODS {
+        let closed = [0.5, 1.0, 2.0].map(|compensation| {
+            let lookup = Lookup { compensation, ..Lookup::stochastic(&map) };
+            1.0 - beside_the_box(&stage, &gbuffer, &method(&screen, &lookup))
+        });
+        // Nothing else is near, and little of it is cut off at 1.
+        let ratios = [closed[0] / closed[1], closed[2] / closed[1]];
+        assert!((ratios[0] - 0.5).abs() < 0.02 && (ratios[1] - 2.0).abs() < 0.2, "{name}: {closed:?}");
+    }
+}
+
+#[test]
+fn golden_views() {
+    for (name, method) in METHODS {
+        check_golden_view_of("sdao", &format!("sd-{name}"), &estimate(method, 4));
+        check_golden_view_of("sdao", &format!("{name}-peeled"), &estimate(method, 0));
+    }
+}
