@@ -23,7 +23,7 @@ use crate::exr_file::{write_gray, write_rgb};
 use crate::light::{adaptive, publish};
 use crate::picture::{open_directions, sites, write_png};
 use crate::progress::Bar;
-use crate::screen_space::ScreenSpace;
+use crate::screen_space::{Picture, ScreenSpace};
 use crate::source::{self, Loaded};
 
 /// Renders what the arguments ask for and writes it.
@@ -235,8 +235,8 @@ fn screen_space(
     camera: &PosedCamera,
 ) -> Result<Vec<f32>> {
     let (radius_m, _) = source::resolve_radius(&loaded.scene, &args.visibility)?;
-    let screen = drawn.gbuffer.screen(&loaded.scene, &drawn.pose, camera)?;
-    method.visibility(&screen, radius_m, args.visibility.seed)
+    let picture = Picture { scene: &loaded.scene, pose: &drawn.pose, camera, gbuffer: &drawn.gbuffer };
+    method.visibility(&picture, radius_m, args.visibility.seed)
 }
 
 /// A server brought to the picture's time, and a client that has joined it.

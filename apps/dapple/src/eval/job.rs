@@ -20,6 +20,7 @@ use super::truth::Cache;
 use crate::args::Method;
 use crate::judge::Judge;
 use crate::picture::{Compared, Shown, sites};
+use crate::screen_space::Picture;
 
 /// What is run together.
 #[derive(Debug, Clone, PartialEq)]
@@ -266,8 +267,9 @@ impl Line {
             }
             (Method::Screen(method), _) => {
                 let scene = stage.scene();
-                let screen = drawn.gbuffer.screen(scene, &drawn.pose, &stage.camera_at(drawn))?;
-                Some(method.visibility(&screen, stage.radius_m, stage.settings.seed)?)
+                let (pose, gbuffer, camera) = (&drawn.pose, &drawn.gbuffer, &stage.camera_at(drawn));
+                let picture = Picture { scene, pose, camera, gbuffer };
+                Some(method.visibility(&picture, stage.radius_m, stage.settings.seed)?)
             }
             _ => None,
         };
