@@ -191,3 +191,43 @@ fn golden_views() {
         check_golden_view_of("sdao", &format!("{name}-peeled"), &estimate(method, 0));
     }
 }
+
+/// The greatest change from one picture to the next of the mean visibility of any tenth of a metre of ground that both show, while the camera of
+/// [`behind_a_pillar`] steps aside until the box stands free.
+fn pop_in(estimate: &dyn Fn(&Shot<'_>) -> Vec<f32>) -> f32 {
+    let (stage, _) = behind_a_pillar();
+    let mut last = std::collections::BTreeMap::<[i32; 2], f32>::new();
+    let mut most = 0.0f32;
+    for frame in 0..=40 {
+        let x = 0.01 * frame as f32;
+        let camera = PosedCamera::look_at(Vec3::new(x, 1.0, 0.0), Vec3::new(x, 0.1, -6.0), 0.4);
+        let (gbuffer, screen) = draw(&stage, &camera, [320, 240]);
+        let shot = Shot { stage: &stage, camera: &camera, gbuffer: &gbuffer, screen: &screen };
+        let mut cells = std::collections::BTreeMap::<[i32; 2], (f32, u32)>::new();
+        for (i, value) in estimate(&shot).into_iter().enumerate() {
+            let surface = gbuffer.surface(&stage.scene, &stage.pose, i).filter(|s| s.instance == 0);
+            let Some(at) = surface.map(|s| s.position_world) else { continue };
+            if at.x.abs() < 1.0 && (at.z + 6.0).abs() < 1.0 {
+                let cell = cells.entry([at.x, at.z].map(|c| (10.0 * c).floor() as i32)).or_default();
+                *cell = (cell.0 + value, cell.1 + 1);
+            }
+        }
+        let seen = cells.into_iter().filter(|(_, (_, count))| *count >= 30);
+        let now: std::collections::BTreeMap<_, _> = seen.map(|(at, (sum, n))| (at, sum / n as f32)).collect();
+        let changes = now.iter().filter_map(|(at, value)| Some((value - last.get(at)?).abs()));
+        most = changes.fold(most, f32::max);
+        last = now;
+    }
+    most
+}
+
+#[test]
+fn what_comes_out_from_behind_a_pillar_pops_in_less() {
+    for (name, method) in METHODS {
+        let single = pop_in(&|shot| method(shot.screen, &Lookup::default()));
+        let sampled = [1, 4, 16].map(|samples| pop_in(&estimate(method, samples)));
+        let peeled = pop_in(&estimate(method, 0));
+        println!("{name}: {single:.4}, with 1, 4 and 16 samples {sampled:.4?}, by all layers {peeled:.4}");
+        assert!(sampled[1] < 0.6 * single && sampled[2] < 0.6 * single, "{name}");
+    }
+}
