@@ -29,10 +29,11 @@ impl Default for MapParams {
 }
 
 impl MapParams {
-    /// What removes most of the error with so many samples: the first surface is left out, and each other one kept in one sample, so that the second is always
-    /// there; in a quarter of 8 or 16.
+    /// What removes most of the error with so many samples: the first surface is left out, and each other one kept in one sample, in two of 8 or 16, so that the
+    /// second is always there.
     pub fn with_samples(samples: u32) -> MapParams {
-        let alpha = (1.0 / samples.max(1) as f32).max(0.25);
+        let kept_in = if samples > 4 { 2.0 } else { 1.0 };
+        let alpha = kept_in / samples.max(1) as f32;
         MapParams { samples, alpha, picks: Picks::Stratified, is_first_left_out: true, seed: 0 }
     }
 

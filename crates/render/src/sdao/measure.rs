@@ -93,30 +93,31 @@ fn times(scene: &Scene, path: &str) -> Vec<f64> {
 }
 
 /// Way of making and of reading a map.
-#[derive(Clone, Copy)]
 struct Way {
     name: &'static str,
-    map: MapParams,
+    map: fn(u32) -> MapParams,
     looks: Looks,
     compensation: f32,
 }
 
 fn ways() -> Vec<Way> {
-    let paper =
-        Way { name: "paper", map: MapParams::default(), looks: Looks::WhereFirstIsFar, compensation: 1.0 };
-    let map = |alpha| MapParams { alpha, is_first_left_out: true, ..MapParams::default() };
-    let rises = Looks::WhereFirstRises;
+    fn at(alpha: f32, samples: u32) -> MapParams {
+        MapParams { alpha, ..MapParams::with_samples(samples) }
+    }
+    let way = |name, map, looks| Way { name, map, looks, compensation: 1.0 };
+    let [far, rises] = [Looks::WhereFirstIsFar, Looks::WhereFirstRises];
     vec![
-        paper,
-        Way { name: "paper, x2", compensation: 2.0, ..paper },
-        Way { name: "paper, rises", looks: rises, ..paper },
-        Way { name: "no first, paper's rule", map: map(0.2), ..paper },
-        Way { name: "no first, 1/16", map: map(0.0625), looks: rises, ..paper },
-        Way { name: "no first, 1/8", map: map(0.125), looks: rises, ..paper },
-        Way { name: "no first, 0.2", map: map(0.2), looks: rises, ..paper },
-        Way { name: "no first, 1/4", map: map(0.25), looks: rises, ..paper },
-        Way { name: "no first, 1/2", map: map(0.5), looks: rises, ..paper },
-        Way { name: "no first, 1", map: map(1.0), looks: rises, ..paper },
+        way("paper", MapParams::paper, far),
+        Way { compensation: 2.0, ..way("paper, doubled", MapParams::paper, far) },
+        way("paper, alpha 0.5", |samples| MapParams { alpha: 0.5, ..MapParams::paper(samples) }, far),
+        way("paper, rises", MapParams::paper, rises),
+        way("no first", |samples| at(0.2, samples), far),
+        way("no first, rises", |samples| at(0.2, samples), rises),
+        way("ours", MapParams::with_samples, rises),
+        way("ours, alpha 1/16", |samples| at(0.0625, samples), rises),
+        way("ours, alpha 1/8", |samples| at(0.125, samples), rises),
+        way("ours, alpha 1/4", |samples| at(0.25, samples), rises),
+        way("ours, alpha 1/2", |samples| at(0.5, samples), rises),
     ]
 }
 
@@ -129,6 +130,8 @@ fn error_to_the_depth_peeled_limit() {
         ("ssao", |s, l| ssao::estimate_visibility_with(s, &SsaoParams::default(), l).unwrap()),
     ];
     let wanted = std::env::var("METHOD").unwrap_or_else(|_| "hbao-plus".into());
+    let ways: Vec<Way> =
+        ways().into_iter().filter(|way| wanted == "hbao-plus" || way.name.len() < 6).collect();
     for (name, scene, path) in scenes() {
         for (method, estimate) in methods.iter().filter(|(method, _)| *method == wanted) {
             let views: Vec<View<'_>> =
@@ -148,10 +151,10 @@ fn error_to_the_depth_peeled_limit() {
             println!(
                 "{name} {method}: {fragments:.1} layers, single {single:.4}, peeled by the rule {rule:.4}"
             );
-            for way in ways() {
+            for way in &ways {
                 let found = [1, 2, 4, 8, 16].map(|samples| {
                     mean(&|v| {
-                        let map = v.map(&MapParams { samples, ..way.map });
+                        let map = v.map(&(way.map)(samples));
                         let lookup = Lookup {
                             looks: way.looks,
                             compensation: way.compensation,
