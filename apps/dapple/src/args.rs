@@ -16,7 +16,7 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
 
-use crate::screen_space::{Effort, ScreenSpace};
+use crate::screen_space::{Effort, Layered, ScreenSpace, Stochastic};
 
 pub(crate) use bake::BakeArgs;
 pub(crate) use bench::{Bench, BenchArgs, JoinArgs, ServedArgs, SoakArgs, ViewersArgs};
@@ -282,6 +282,20 @@ pub(crate) enum RenderMethod {
     HbaoPlus,
     /// Screen space: GTAO with a visibility bitmask.
     Gtao,
+    /// Screen space: SSAO over a stochastic depth map of 4 samples.
+    SdSsao,
+    /// Screen space: HBAO over a stochastic depth map of 4 samples.
+    SdHbao,
+    /// Screen space: HBAO+ over a stochastic depth map of 4 samples.
+    SdHbaoPlus,
+    /// The same over those of two cameras.
+    SdHbaoPlusMv,
+    /// Screen space: SSAO over all layers.
+    SsaoPeeled,
+    /// Screen space: HBAO over all layers.
+    HbaoPeeled,
+    /// Screen space: HBAO+ over all layers.
+    HbaoPlusPeeled,
     /// No occlusion.
     None,
 }
@@ -289,6 +303,7 @@ pub(crate) enum RenderMethod {
 impl RenderMethod {
     /// Which screen-space method it is, if it is one.
     pub(crate) fn screen_space(self) -> Option<ScreenSpace> {
+        let stochastic = |method| Some(ScreenSpace::Stochastic(method, Stochastic::DEFAULT));
         match self {
             RenderMethod::Ssao => Some(ScreenSpace::Ssao),
             RenderMethod::Alchemy => Some(ScreenSpace::Alchemy),
@@ -296,6 +311,15 @@ impl RenderMethod {
             RenderMethod::Hbao => Some(ScreenSpace::Hbao),
             RenderMethod::HbaoPlus => Some(ScreenSpace::HbaoPlus),
             RenderMethod::Gtao => Some(ScreenSpace::Gtao),
+            RenderMethod::SdSsao => stochastic(Layered::Ssao),
+            RenderMethod::SdHbao => stochastic(Layered::Hbao),
+            RenderMethod::SdHbaoPlus => stochastic(Layered::HbaoPlus),
+            RenderMethod::SdHbaoPlusMv => {
+                Some(ScreenSpace::Stochastic(Layered::HbaoPlus, Stochastic::TWO_CAMERAS))
+            }
+            RenderMethod::SsaoPeeled => Some(ScreenSpace::Peeled(Layered::Ssao)),
+            RenderMethod::HbaoPeeled => Some(ScreenSpace::Peeled(Layered::Hbao)),
+            RenderMethod::HbaoPlusPeeled => Some(ScreenSpace::Peeled(Layered::HbaoPlus)),
             RenderMethod::Psao | RenderMethod::PsaoHat | RenderMethod::Rtao | RenderMethod::None => None,
         }
     }
@@ -384,7 +408,7 @@ impl FromStr for Method {
             "none" => Ok(Method::None),
             "rtao" => Ok(Method::Rtao { rays: 16 }),
             _ => {
-                if let Some(method) = ScreenSpace::ALL.into_iter().find(|method| method.name() == s) {
+                if let Some(method) = ScreenSpace::from_name(s) {
                     return Ok(Method::Screen(method));
                 }
                 let rays = s.strip_prefix("rtao-").and_then(|r| r.parse().ok());
@@ -397,7 +421,8 @@ impl FromStr for Method {
                     _ => Err(
                         "known methods: psao, psao-mls, psao-hat, psao-hat-F with its radius times F from 0.1 to 8, \
                               psao-paper, psao-paper-mls, sas-B with B from 1 to 1024, rtao-R with R from 1 to 65536 (rtao-16), ssao, alchemy, sao, hbao, hbao-plus, \
-                              gtao, none"
+                              gtao, sd-ssao, sd-hbao, sd-hbao-plus and these with -S for 1, 2, 4, 8 or 16 samples, sd-hbao-plus-mv, -paper \
+                              after any of them, ssao-peeled, hbao-peeled, hbao-plus-peeled, none"
                             .into(),
                     ),
                 }

@@ -27,6 +27,17 @@ pub enum RenderError {
         /// Samples asked for.
         samples: u64,
     },
+    /// More surfaces lie under the samples of a picture than may be kept.
+    #[error(
+        "{fragments} surfaces lie under the samples of this picture, at most {most} are kept: draw a smaller picture or take \
+         fewer samples per pixel"
+    )]
+    Fragments {
+        /// Surfaces under all samples together.
+        fragments: u64,
+        /// How many are kept.
+        most: u64,
+    },
     /// A lens or placement that projects nothing.
     #[error("the camera cannot project: {reason}")]
     Camera {

@@ -33,6 +33,7 @@ pub mod image;
 pub mod psao;
 pub mod sao;
 pub mod screen_space;
+pub mod sdao;
 pub mod shade;
 pub mod ssao;
 pub mod upsample;

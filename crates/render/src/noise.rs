@@ -15,6 +15,18 @@ pub(crate) fn interleaved_gradient([column, row]: [usize; 2]) -> f32 {
     (52.982_918_9 * inner.fract()).fract() as f32
 }
 
+/// Bits that depend on every bit of every word, and on their order: rounds of the finaliser of MurmurHash3.
+pub(crate) fn hash(words: impl IntoIterator<Item = u32>) -> u32 {
+    let mix = |mut h: u32| {
+        h ^= h >> 16;
+        h = h.wrapping_mul(0x85eb_ca6b);
+        h ^= h >> 13;
+        h = h.wrapping_mul(0xc2b2_ae35);
+        h ^ (h >> 16)
+    };
+    words.into_iter().fold(0, |h: u32, v| mix((h ^ v).wrapping_add(0x9e37_79b9)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,6 +4,7 @@
 //! See the README in this folder for rules and precision.
 
 mod guard;
+mod layers;
 mod pick;
 mod raster;
 mod screen;
@@ -17,9 +18,11 @@ use rayon::prelude::*;
 
 use crate::{RenderError, projection, texture};
 pub use guard::GuardBand;
+pub use layers::{Layers, MAX_FRAGMENTS};
 pub use pick::surface_at;
 pub(crate) use raster::{Sink, Triangle, View, barycentrics, draw};
 pub use screen::Screen;
+pub(crate) use screen::half_sources;
 pub use surface::{LocalSurface, RestSurface, Surface};
 
 /// The instance index of a sample that sees the background.
@@ -132,30 +135,49 @@ pub fn rasterize(
     height: u32,
     samples_per_axis: u32,
 ) -> Result<GBuffer, RenderError> {
-    let size_error = RenderError::Size { width, height, samples_per_axis };
-    let sides = 1..=MAX_SIDE;
-    if !sides.contains(&width)
-        || !sides.contains(&height)
-        || !(1..=MAX_SAMPLES_PER_AXIS).contains(&samples_per_axis)
-    {
-        return Err(size_error);
-    }
-    let (columns, rows) = (width * samples_per_axis, height * samples_per_axis);
-    let count = u64::from(columns) * u64::from(rows);
-    if count > MAX_SAMPLES {
-        return Err(size_error);
-    }
-    let clip_from_world = projection::clip_from_world(camera, width, height)?;
-    check_scene(scene, pose)?;
-
-    let mut samples = Vec::new();
-    samples.try_reserve_exact(count as usize).map_err(|_| RenderError::Memory { samples: count })?;
-    samples.resize(count as usize, Sample::BACKGROUND);
-    let view = View { clip_from_world, columns, rows };
+    let view = View::checked(scene, pose, camera, [width, height], samples_per_axis)?;
+    let mut samples = buffer(&view, Sample::BACKGROUND)?;
     let sink = SampleSink { scene, pose, view: &view };
     draw(&view, scene, pose, true, |_| true, &sink, &mut samples);
     fill_barycentrics(&view, scene, pose, &mut samples);
     Ok(GBuffer { width, height, samples_per_axis, samples })
+}
+
+/// One value for each sample of a view.
+pub(crate) fn buffer<T: Clone>(view: &View, value: T) -> Result<Vec<T>, RenderError> {
+    let count = view.columns as usize * view.rows as usize;
+    let mut values = Vec::new();
+    values.try_reserve_exact(count).map_err(|_| RenderError::Memory { samples: count as u64 })?;
+    values.resize(count, value);
+    Ok(values)
+}
+
+impl View {
+    /// Of a camera that can project on a picture whose size is in range, for a scene that can be drawn.
+    pub(crate) fn checked(
+        scene: &Scene,
+        pose: &Pose,
+        camera: &PosedCamera,
+        [width, height]: [u32; 2],
+        samples_per_axis: u32,
+    ) -> Result<View, RenderError> {
+        let size_error = RenderError::Size { width, height, samples_per_axis };
+        let sides = 1..=MAX_SIDE;
+        if !sides.contains(&width)
+            || !sides.contains(&height)
+            || !(1..=MAX_SAMPLES_PER_AXIS).contains(&samples_per_axis)
+        {
+            return Err(size_error);
+        }
+        let (columns, rows) = (width * samples_per_axis, height * samples_per_axis);
+        let count = u64::from(columns) * u64::from(rows);
+        if count > MAX_SAMPLES {
+            return Err(size_error);
+        }
+        let clip_from_world = projection::clip_from_world(camera, width, height)?;
+        check_scene(scene, pose)?;
+        Ok(View { clip_from_world, columns, rows })
+    }
 }
 
 /// Keeps the nearest surface of each sample; equal depths go to the lower (instance, triangle).

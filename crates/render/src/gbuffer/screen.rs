@@ -24,7 +24,7 @@ pub struct Screen {
 
 /// How view space falls on the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Lens {
+pub(super) struct Lens {
     /// Half the picture's width and height: at distance 1 for a perspective, anywhere for a parallel camera.
     half_extent: [f32; 2],
     is_perspective: bool,
@@ -76,7 +76,7 @@ impl GBuffer {
 }
 
 impl Lens {
-    fn new(projection: &Projection, aspect: f64) -> Lens {
+    pub(super) fn new(projection: &Projection, aspect: f64) -> Lens {
         let (half_height, is_perspective) = match *projection {
             Projection::Perspective { yfov, .. } => (libm::tan(0.5 * f64::from(yfov)), true),
             Projection::Orthographic { half_height, .. } => (f64::from(half_height), false),
@@ -86,6 +86,20 @@ impl Lens {
 }
 
 impl Screen {
+    /// A picture of which distances are known and normals are not: they are zero.
+    pub(super) fn without_normals(lens: Lens, columns: u32, distances_m: Vec<f32>) -> Screen {
+        let rows = (distances_m.len() / columns as usize) as u32;
+        let normals_view = vec![Vec3::ZERO; distances_m.len()];
+        let span = [columns as f32, rows as f32];
+        Screen { columns, rows, span, centres: Vec::new(), lens, distances_m, normals_view }
+    }
+
+    /// A picture on which nothing is seen.
+    pub(crate) fn of_nothing(camera: &PosedCamera, [columns, rows]: [u32; 2]) -> Screen {
+        let lens = Lens::new(&camera.projection, f64::from(columns) / f64::from(rows));
+        Screen::without_normals(lens, columns, vec![f32::INFINITY; columns as usize * rows as usize])
+    }
+
     /// Samples in a row.
     pub fn columns(&self) -> u32 {
         self.columns
@@ -165,14 +179,7 @@ impl Screen {
     /// normals and places are true ones; [`Screen::centre`] says where in its square a sample lies.
     pub fn half(&self) -> Screen {
         let (columns, rows) = (self.columns.div_ceil(2), self.rows.div_ceil(2));
-        let sources: Vec<usize> = (0..rows as usize * columns as usize)
-            .map(|i| {
-                let (x, y) = (i % columns as usize, i / columns as usize);
-                let column = (2 * x + (y & 1 ^ 1)).min(self.columns as usize - 1);
-                let row = (2 * y + (x & 1 ^ 1)).min(self.rows as usize - 1);
-                row * self.columns as usize + column
-            })
-            .collect();
+        let sources: Vec<usize> = half_sources(self.columns, self.rows).collect();
         let centre = |&i: &usize| {
             self.centre([i % self.columns as usize, i / self.columns as usize]).map(|at| 0.5 * at)
         };
@@ -190,7 +197,11 @@ impl Screen {
     /// The sample that lies so many to the right and down of another's centre; `None` outside of the picture.
     pub fn neighbour(&self, at: [usize; 2], by: [f32; 2]) -> Option<[usize; 2]> {
         let [column, row] = self.centre(at);
-        let (column, row) = (column + by[0], row + by[1]);
+        self.sample_in([column + by[0], row + by[1]])
+    }
+
+    /// The sample that a point of the picture lies in; `None` outside of the picture. Coordinates as of [`Screen::place_view`].
+    pub fn sample_in(&self, [column, row]: [f32; 2]) -> Option<[usize; 2]> {
         // Not a number is outside, too.
         let inside = column >= 0.0 && column < self.span[0] && row >= 0.0 && row < self.span[1];
         inside.then_some([column as usize, row as usize])
@@ -206,6 +217,11 @@ impl Screen {
         if self.lens.is_perspective { (-place_view).normalize_or(Vec3::Z) } else { Vec3::Z }
     }
 
+    /// Whether the ray of the picture that goes to a place falls in front of its plane with a normal, so that it goes on behind it.
+    pub(crate) fn falls_on(&self, place_view: Vec3, normal_view: Vec3) -> bool {
+        if self.lens.is_perspective { normal_view.dot(place_view) <= 0.0 } else { normal_view.z >= 0.0 }
+    }
+
     /// How many samples of the picture a metre across the view axis is long at a distance. Samples are taken to be square.
     pub fn samples_per_metre(&self, distance_m: f32) -> f32 {
         let at_one = 0.5 * self.span[1] / self.lens.half_extent[1];
@@ -214,6 +230,12 @@ impl Screen {
 
     /// Index of the sample whose square of the picture a place falls on; `None` outside of the picture and behind the camera.
     pub fn sample_at(&self, position_view: Vec3) -> Option<usize> {
+        let [column, row] = self.sample_in(self.point_of(position_view)?)?;
+        Some(row * self.columns as usize + column)
+    }
+
+    /// The point of the picture, or beside it, that a place falls on; `None` behind the camera. Coordinates as of [`Screen::place_view`].
+    pub fn point_of(&self, position_view: Vec3) -> Option<[f32; 2]> {
         let distance = -position_view.z;
         let scale = match self.lens.is_perspective {
             true if distance > 0.0 => 1.0 / distance,
@@ -223,10 +245,20 @@ impl Screen {
         let [half_width, half_height] = self.lens.half_extent;
         let column = (0.5 + 0.5 * position_view.x * scale / half_width) * self.span[0];
         let row = (0.5 - 0.5 * position_view.y * scale / half_height) * self.span[1];
-        // Not a number is outside, too.
-        let inside = column >= 0.0 && column < self.span[0] && row >= 0.0 && row < self.span[1];
-        inside.then(|| row as usize * self.columns as usize + column as usize)
+        Some([column, row])
     }
+}
+
+/// Of a picture with so many columns and rows the indices of the samples that [`Screen::half`] has, row-major.
+pub(crate) fn half_sources(columns: u32, rows: u32) -> impl Iterator<Item = usize> {
+    let (columns, rows) = (columns as usize, rows as usize);
+    let half_columns = columns.div_ceil(2);
+    (0..rows.div_ceil(2) * half_columns).map(move |i| {
+        let (x, y) = (i % half_columns, i / half_columns);
+        let column = (2 * x + (y & 1 ^ 1)).min(columns - 1);
+        let row = (2 * y + (x & 1 ^ 1)).min(rows - 1);
+        row * columns + column
+    })
 }
 
 #[cfg(test)]

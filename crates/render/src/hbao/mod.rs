@@ -8,6 +8,7 @@ mod tests;
 use crate::bilateral::Bilateral;
 use crate::gbuffer::Screen;
 use crate::noise::interleaved_gradient;
+use crate::sdao::{Looks, Lookup};
 use crate::{AfterPass, RenderError};
 use glam::Vec3;
 
@@ -92,82 +93,209 @@ impl HbaoParams {
 /// # Errors
 /// A parameter out of its range.
 pub fn estimate_visibility(screen: &Screen, params: &HbaoParams) -> Result<Vec<f32>, RenderError> {
-    estimate_by_passes(screen, params, &mut |_| ())
+    estimate_visibility_with(screen, params, &Lookup::default())
 }
 
-/// As [`estimate_visibility`], and tells when each pass is done: `samples`, `blur`.
+/// The same with what is known of hidden surfaces: of all that a step may look at, what blocks most counts (\[Vermeer2021\] Alg. 2, and lines 18 to 25 of Alg. 3).
+///
+/// # Errors
+/// A parameter out of its range, or hidden surfaces of another picture.
+pub fn estimate_visibility_with(
+    screen: &Screen,
+    params: &HbaoParams,
+    lookup: &Lookup<'_>,
+) -> Result<Vec<f32>, RenderError> {
+    estimate_by_passes(screen, params, lookup, &mut |_| ())
+}
+
+/// As [`estimate_visibility_with`], and tells when each pass is done: `samples`, `blur`.
 ///
 /// # Errors
 /// As there.
 pub fn estimate_by_passes(
     screen: &Screen,
     params: &HbaoParams,
+    lookup: &Lookup<'_>,
     after: AfterPass<'_>,
 ) -> Result<Vec<f32>, RenderError> {
     params.check()?;
-    let visibility =
-        screen.map(|at| 1.0 - (params.strength * occlusion_at(screen, params, at)).clamp(0.0, 1.0));
+    lookup.check(screen)?;
+    let estimator = Estimator::new(screen, params, lookup);
+    let visibility = screen.map(|at| match estimator.centre(at) {
+        Some(centre) => params.visibility(estimator.occlusion(&centre)),
+        None => 1.0,
+    });
     after("samples");
     let visibility = Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility);
     after("blur");
     Ok(visibility)
 }
 
-fn occlusion_at(screen: &Screen, params: &HbaoParams, at: [usize; 2]) -> f32 {
-    let index = at[1] * screen.columns() as usize + at[0];
-    let normal = screen.normals_view()[index];
-    // A triangle without an area has no normal.
-    let Some(place) = screen.position_view(index).filter(|_| normal != Vec3::ZERO) else { return 0.0 };
-    let radius = params.radius_m * screen.samples_per_metre(-place.z);
-    let step = radius / (params.steps + 1) as f32;
-    // Directions and steps begin elsewhere in each sample.
-    let (turn, jitter) = (interleaved_gradient(at), interleaved_gradient([at[1] + 57, at[0] + 23]));
-    let bias = params.bias_degrees.to_radians();
-    let mut sum = 0.0;
-    for direction in 0..params.directions {
-        let angle = std::f32::consts::TAU * (direction as f32 + turn) / params.directions as f32;
-        let (sin, cos) = libm::sincosf(angle);
-        let steps = (0..params.steps).filter_map(|i| {
-            let length = step * (i as f32 + 0.5 + jitter);
-            let seen = screen.neighbour(at, [length * cos, length * sin])?;
-            let to_seen = screen.position_at(seen)? - place;
-            let squared = to_seen.length_squared();
-            let part = squared / (params.radius_m * params.radius_m);
-            (part < 1.0 && squared > 0.0).then_some((to_seen, 1.0 - part))
-        });
-        sum += match params.horizon {
-            Horizon::Highest => {
-                // Where the plane of the surface goes in that direction of the picture.
-                let [column, row] = screen.centre(at);
-                let along = screen.on_plane(column + cos, row + sin, place, normal).map(|next| next - place);
-                // Samples lie beside the direction by up to half of one each way: the plane must not rise over itself for that.
-                let steps =
-                    steps.filter(|(to_seen, _)| normal.dot(*to_seen) > libm::sinf(bias) * to_seen.length());
-                under_horizon(along.unwrap_or(Vec3::NEG_Z), bias, steps)
-            }
-            Horizon::Mean => mean_height(normal, libm::sinf(bias), steps) / params.steps as f32,
-        };
+impl HbaoParams {
+    /// By the mean occlusion of all directions.
+    pub(crate) fn visibility(&self, occlusion: f32) -> f32 {
+        1.0 - (self.strength * occlusion).clamp(0.0, 1.0)
     }
-    sum / params.directions as f32
 }
 
-/// Alg. 2, lines 8 to 19: how much of the rays over the surface in a direction is under the highest place, each stretch weighted by how far what raised the horizon
-/// is.
-fn under_horizon(tangent: Vec3, bias: f32, steps: impl Iterator<Item = (Vec3, f32)>) -> f32 {
-    let tangent = libm::asinf((tangent.z / tangent.length().max(1e-12)).clamp(-1.0, 1.0));
-    let mut sine = libm::sinf((tangent + bias).min(std::f32::consts::FRAC_PI_2));
-    let mut sum = 0.0;
-    for (to_seen, weight) in steps {
-        let found = to_seen.z / to_seen.length();
-        if found > sine {
-            sum += weight * (found - sine);
-            sine = found;
+/// A place on a surface, in the view space of some picture, and where on that picture it lies.
+pub(crate) struct Centre {
+    /// Coordinates as of [`Screen::place_view`].
+    pub(crate) point: [f32; 2],
+    pub(crate) place: Vec3,
+    pub(crate) normal: Vec3,
+    /// How far directions are turned, as a part of the angle between two of them, and steps moved, as a part of one.
+    pub(crate) turn: f32,
+    pub(crate) jitter: f32,
+}
+
+/// Looks along directions of a picture.
+pub(crate) struct Estimator<'a> {
+    screen: &'a Screen,
+    params: &'a HbaoParams,
+    lookup: &'a Lookup<'a>,
+    bias: f32,
+    sin_bias: f32,
+}
+
+impl<'a> Estimator<'a> {
+    pub(crate) fn new(screen: &'a Screen, params: &'a HbaoParams, lookup: &'a Lookup<'a>) -> Estimator<'a> {
+        let bias = params.bias_degrees.to_radians();
+        Estimator { screen, params, lookup, bias, sin_bias: libm::sinf(bias) }
+    }
+
+    /// What a sample of the picture itself sees; `None` for the background, and for a triangle without an area, which has no normal.
+    pub(crate) fn centre(&self, at: [usize; 2]) -> Option<Centre> {
+        let index = at[1] * self.screen.columns() as usize + at[0];
+        let normal = self.screen.normals_view()[index];
+        let place = self.screen.position_view(index).filter(|_| normal != Vec3::ZERO)?;
+        // Directions and steps begin elsewhere in each sample.
+        let (turn, jitter) = (interleaved_gradient(at), interleaved_gradient([at[1] + 57, at[0] + 23]));
+        Some(Centre { point: self.screen.centre(at), place, normal, turn, jitter })
+    }
+
+    /// The mean over all directions.
+    pub(crate) fn occlusion(&self, centre: &Centre) -> f32 {
+        let mut sum = 0.0;
+        for direction in 0..self.params.directions {
+            sum += self.along(centre, self.direction(centre, direction));
+        }
+        sum / self.params.directions as f32
+    }
+
+    /// Unit vector of a direction on the picture, row downwards.
+    pub(crate) fn direction(&self, centre: &Centre, direction: u32) -> [f32; 2] {
+        let turn = (direction as f32 + centre.turn) / self.params.directions as f32;
+        let (sin, cos) = libm::sincosf(std::f32::consts::TAU * turn);
+        [cos, sin]
+    }
+
+    /// Where the plane of the surface goes in a direction of the picture.
+    pub(crate) fn tangent(&self, centre: &Centre, [cos, sin]: [f32; 2]) -> Option<Vec3> {
+        let [column, row] = centre.point;
+        let next = self.screen.on_plane(column + cos, row + sin, centre.place, centre.normal);
+        next.map(|next| next - centre.place)
+    }
+
+    /// Occlusion from one direction.
+    pub(crate) fn along(&self, centre: &Centre, [cos, sin]: [f32; 2]) -> f32 {
+        let radius = self.params.radius_m * self.screen.samples_per_metre(-centre.place.z);
+        let step = radius / (self.params.steps + 1) as f32;
+        let columns = self.screen.columns() as usize;
+        let steps = (0..self.params.steps).filter_map(|i| {
+            let length = step * (i as f32 + 0.5 + centre.jitter);
+            let point = [centre.point[0] + length * cos, centre.point[1] + length * sin];
+            self.screen.sample_in(point).map(|[column, row]| row * columns + column)
+        });
+        match self.params.horizon {
+            Horizon::Highest => {
+                let tangent = self.tangent(centre, [cos, sin]).unwrap_or(Vec3::NEG_Z);
+                self.under_horizon(centre, tangent, steps)
+            }
+            Horizon::Mean => {
+                steps.map(|index| self.height(centre, index)).sum::<f32>() / self.params.steps as f32
+            }
         }
     }
-    sum
-}
 
-/// Heights over the surface of all places, as sines over a bias, by weight.
-fn mean_height(normal: Vec3, bias: f32, steps: impl Iterator<Item = (Vec3, f32)>) -> f32 {
-    steps.map(|(to_seen, weight)| weight * (normal.dot(to_seen) / to_seen.length() - bias).max(0.0)).sum()
+    /// The way to the first surface of a sample.
+    fn to_first(&self, centre: &Centre, index: usize) -> Option<Vec3> {
+        Some(self.screen.position_view(index)? - centre.place)
+    }
+
+    /// The ways to hidden ones.
+    fn to_hidden(&self, centre: &Centre, index: usize) -> impl Iterator<Item = Vec3> {
+        let place = centre.place;
+        self.lookup.places(self.screen, index).map(move |hidden| hidden - place)
+    }
+
+    /// How much what is so far away counts; `None` beyond the radius.
+    fn weight(&self, to_seen: Vec3) -> Option<f32> {
+        let squared = to_seen.length_squared();
+        let part = squared / (self.params.radius_m * self.params.radius_m);
+        (part < 1.0 && squared > 0.0).then_some(1.0 - part)
+    }
+
+    /// Alg. 2, lines 8 to 35: how much of the rays over the surface in a direction is under the highest place, each stretch weighted by how far what raised the
+    /// horizon is.
+    fn under_horizon(&self, centre: &Centre, tangent: Vec3, steps: impl Iterator<Item = usize>) -> f32 {
+        let tangent = libm::asinf((tangent.z / tangent.length().max(1e-12)).clamp(-1.0, 1.0));
+        let mut sine = libm::sinf((tangent + self.bias).min(std::f32::consts::FRAC_PI_2));
+        let mut sum = 0.0;
+        for index in steps {
+            // By how much what is seen raises the sum, and to where the horizon.
+            let gain = |to_seen: Vec3| {
+                let weight = self.weight(to_seen)?;
+                let (length, found) = (to_seen.length(), to_seen.z / to_seen.length());
+                // Samples lie beside the direction by up to half of one each way: the plane must not rise over itself for that.
+                let is_above = centre.normal.dot(to_seen) > self.sin_bias * length;
+                (is_above && found > sine).then_some((weight * (found - sine), found))
+            };
+            let first = self.to_first(centre, index);
+            let seen = first.and_then(gain);
+            let is_under = |first: Vec3| first.z <= sine * first.length();
+            let is_decided = first.is_some_and(|first| match self.lookup.looks {
+                Looks::Everywhere => false,
+                Looks::WhereFirstIsFar => self.weight(first).is_some() || is_under(first),
+                Looks::WhereFirstRises => is_under(first),
+            });
+            let hidden = if is_decided {
+                None
+            } else {
+                let gains = self.to_hidden(centre, index).filter_map(gain);
+                gains.reduce(|best, other| if other.0 > best.0 { other } else { best })
+            };
+            let hidden = hidden.filter(|(more, _)| seen.is_none_or(|seen| *more > seen.0));
+            let hidden = hidden.map(|(more, found)| (self.lookup.compensation * more, found));
+            if let Some((more, found)) = hidden.or(seen) {
+                sum += more;
+                sine = found;
+            }
+        }
+        sum
+    }
+
+    /// Alg. 3, lines 18 to 24: the greatest height over the surface, as a sine over a bias, by weight, of all that is known under a sample.
+    fn height(&self, centre: &Centre, index: usize) -> f32 {
+        let height = |to_seen: Vec3| {
+            let weight = self.weight(to_seen)?;
+            Some(weight * (centre.normal.dot(to_seen) / to_seen.length() - self.sin_bias).max(0.0))
+        };
+        let first = self.to_first(centre, index);
+        let seen = first.and_then(height);
+        let is_decided = first.is_some_and(|first| match self.lookup.looks {
+            Looks::Everywhere => false,
+            Looks::WhereFirstIsFar => seen.is_some(),
+            // Rays that come from below the plane may still rise over it.
+            Looks::WhereFirstRises => {
+                centre.normal.dot(first) <= self.sin_bias * first.length()
+                    && self.screen.falls_on(centre.place + first, centre.normal)
+            }
+        });
+        if is_decided {
+            return seen.unwrap_or(0.0);
+        }
+        let hidden = self.to_hidden(centre, index).filter_map(height).fold(0.0, f32::max);
+        seen.unwrap_or(0.0).max(self.lookup.compensation * hidden)
+    }
 }

@@ -11,6 +11,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::gbuffer::Screen;
+use crate::sdao::Lookup;
 use crate::{AfterPass, RenderError};
 use pattern::Pattern;
 
@@ -71,24 +72,38 @@ impl SsaoParams {
 /// # Errors
 /// A parameter out of its range.
 pub fn estimate_visibility(screen: &Screen, params: &SsaoParams) -> Result<Vec<f32>, RenderError> {
-    estimate_by_passes(screen, params, &mut |_| ())
+    estimate_visibility_with(screen, params, &Lookup::default())
 }
 
-/// As [`estimate_visibility`], and tells when each pass is done: `samples`, `blur`.
+/// The same with what is known of hidden surfaces: a place is blocked if any of those that are seen through its sample blocks it (\[Vermeer2021\] sec. 3.2).
+///
+/// # Errors
+/// A parameter out of its range, or hidden surfaces of another picture.
+pub fn estimate_visibility_with(
+    screen: &Screen,
+    params: &SsaoParams,
+    lookup: &Lookup<'_>,
+) -> Result<Vec<f32>, RenderError> {
+    estimate_by_passes(screen, params, lookup, &mut |_| ())
+}
+
+/// As [`estimate_visibility_with`], and tells when each pass is done: `samples`, `blur`.
 ///
 /// # Errors
 /// As there.
 pub fn estimate_by_passes(
     screen: &Screen,
     params: &SsaoParams,
+    lookup: &Lookup<'_>,
     after: AfterPass<'_>,
 ) -> Result<Vec<f32>, RenderError> {
     params.check()?;
+    lookup.check(screen)?;
     let pattern = Pattern::new(params.samples, params.seed);
     let columns = screen.columns() as usize;
     let occlusion = screen.map(|[column, row]| {
         let turn = pattern.turn(column, row);
-        occlusion_at(screen, row * columns + column, &pattern.offsets, turn, params)
+        occlusion_at(screen, lookup, row * columns + column, &pattern.offsets, turn, params)
     });
     after("samples");
     // Blurred as occlusion, so that what is open stays exactly 1.
@@ -114,27 +129,39 @@ pub(crate) fn middle_weight(params: &SsaoParams) -> f32 {
 }
 
 /// Part of the places around a sample that lie behind what the picture shows.
-fn occlusion_at(screen: &Screen, index: usize, offsets: &[Vec3], turn: Vec3, params: &SsaoParams) -> f32 {
+fn occlusion_at(
+    screen: &Screen,
+    lookup: &Lookup<'_>,
+    index: usize,
+    offsets: &[Vec3],
+    turn: Vec3,
+    params: &SsaoParams,
+) -> f32 {
     let normal = screen.normals_view()[index];
     // A triangle without an area has no normal.
     let Some(position) = screen.position_view(index).filter(|_| normal != Vec3::ZERO) else { return 0.0 };
     let tangent = tangent(normal, turn);
     let bitangent = normal.cross(tangent);
     let (radius, height) = (params.radius_m, params.bias * params.radius_m);
-    let mut blocked = 0u32;
+    let (mut seen, mut hidden) = (0u32, 0u32);
     for offset in offsets {
         let place = position + (tangent * offset.x + bitangent * offset.y + normal * offset.z) * radius;
-        let Some(seen) = screen.sample_at(place).and_then(|other| screen.position_view(other)) else {
-            continue;
+        let is_blocked_by = |by: Vec3| {
+            let to_seen = by - position;
+            let is_nearer = by.z > place.z;
+            let is_within = to_seen.length_squared() <= radius * radius;
+            // What hides a place of the hemisphere from an eye above the plane is above it, too: only rounding to samples says else.
+            is_nearer && is_within && normal.dot(to_seen) > height
         };
-        let to_seen = seen - position;
-        let is_nearer = seen.z > place.z;
-        let is_within = to_seen.length_squared() <= radius * radius;
-        // What hides a place of the hemisphere from an eye above the plane is above it, too: only rounding to samples says else.
-        let is_above = normal.dot(to_seen) > height;
-        blocked += u32::from(is_nearer && is_within && is_above);
+        let Some(other) = screen.sample_at(place) else { continue };
+        // Where the first surface blocks, others change nothing: whether they are looked at there (sec. 3.3) is a matter of time alone.
+        if screen.position_view(other).is_some_and(is_blocked_by) {
+            seen += 1;
+        } else if lookup.places(screen, other).any(is_blocked_by) {
+            hidden += 1;
+        }
     }
-    blocked as f32 / offsets.len() as f32
+    (seen as f32 + lookup.compensation * hidden as f32) / offsets.len() as f32
 }
 
 /// The unit vector of the plane with unit normal `normal` that is nearest to `turn`.

@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use crate::noise::hash;
+
 /// Side of the tile of turns, samples of the picture.
 pub(super) const NOISE_SIDE: usize = 16;
 
@@ -39,17 +41,9 @@ fn direction(v: Vec3, otherwise: Vec3) -> Vec3 {
     v.try_normalize().unwrap_or(otherwise)
 }
 
-/// A number in [0, 1) that depends on every bit of a seed, a list and a place in it: rounds of the finaliser of MurmurHash3.
+/// A number in [0, 1) that depends on every bit of a seed, a list and a place in it.
 fn random(seed: u32, list: u32, place: u32) -> f32 {
-    let mix = |mut h: u32| {
-        h ^= h >> 16;
-        h = h.wrapping_mul(0x85eb_ca6b);
-        h ^= h >> 13;
-        h = h.wrapping_mul(0xc2b2_ae35);
-        h ^ (h >> 16)
-    };
-    let bits = [seed, list, place].into_iter().fold(0, |h: u32, v| mix((h ^ v).wrapping_add(0x9e37_79b9)));
-    (bits >> 8) as f32 * (1.0 / (1 << 24) as f32)
+    (hash([seed, list, place]) >> 8) as f32 * (1.0 / (1 << 24) as f32)
 }
 
 #[cfg(test)]

@@ -10,6 +10,17 @@ use crate::gbuffer::{GBuffer, Screen, rasterize};
 /// A method with its parameters.
 pub(crate) type Estimate<'a> = &'a (dyn Fn(&Screen) -> Vec<f32> + Sync);
 
+/// A picture of a stage, for methods that draw it once more.
+pub(crate) struct Shot<'a> {
+    pub(crate) stage: &'a Stage,
+    pub(crate) camera: &'a PosedCamera,
+    pub(crate) gbuffer: &'a GBuffer,
+    pub(crate) screen: &'a Screen,
+}
+
+/// A method that does.
+pub(crate) type EstimateShot<'a> = &'a (dyn Fn(&Shot<'_>) -> Vec<f32> + Sync);
+
 pub(crate) fn look(eye: Vec3, target: Vec3) -> PosedCamera {
     PosedCamera::look_at(eye, target, 0.8)
 }
@@ -47,6 +58,11 @@ pub(crate) fn beside_a_wall(d: f64, h: f64, r: f64) -> f64 {
 
 /// A plane seen at up to so many degrees from any side, through both lenses, before and behind a parallel camera's own place, is this open at least.
 pub(crate) fn check_walls(estimate: Estimate<'_>, steepest: f64, least: f32) {
+    check_walls_of(&|shot| estimate(shot.screen), steepest, least);
+}
+
+/// The same for methods that draw the stage once more.
+pub(crate) fn check_walls_of(estimate: EstimateShot<'_>, steepest: f64, least: f32) {
     let mut stage = Stage::new();
     stage.add(ground(60.0), 0, Affine3A::IDENTITY);
     let angles = [0.0, 10.0, 45.0, 60.0, 75.0, 82.0f64];
@@ -68,7 +84,8 @@ pub(crate) fn check_walls(estimate: Estimate<'_>, steepest: f64, least: f32) {
             }
             camera.world_from_view *= rolled;
             let (gbuffer, screen) = draw(&stage, &camera, [97, 61]);
-            let visibility = estimate(&screen);
+            let visibility =
+                estimate(&Shot { stage: &stage, camera: &camera, gbuffer: &gbuffer, screen: &screen });
             let covered = gbuffer.samples().iter().filter(|s| s.is_covered()).count();
             assert!(covered > 3000, "{degrees}, {turn}: {covered}");
             let closed = visibility.iter().position(|v| *v < least || v.is_nan());
@@ -80,10 +97,15 @@ pub(crate) fn check_walls(estimate: Estimate<'_>, steepest: f64, least: f32) {
 
 /// Means over strips of the ground beside the wall of [`corner`], a tenth of the radius wide, the nearest first: what is found, and the closed form.
 pub(crate) fn corner_profile(estimate: Estimate<'_>, radius_m: f32) -> Vec<[f64; 2]> {
+    corner_profile_of(&|shot| estimate(shot.screen), radius_m)
+}
+
+/// The same for methods that draw the stage once more.
+pub(crate) fn corner_profile_of(estimate: EstimateShot<'_>, radius_m: f32) -> Vec<[f64; 2]> {
     let stage = corner();
     let camera = look(Vec3::new(3.0, 2.5, 0.0), Vec3::new(0.5, 0.0, 0.0));
     let (gbuffer, screen) = draw(&stage, &camera, [240, 240]);
-    let visibility = estimate(&screen);
+    let visibility = estimate(&Shot { stage: &stage, camera: &camera, gbuffer: &gbuffer, screen: &screen });
     let mut strips = [(0.0f64, 0.0f64, 0u32); 12];
     for (i, &v) in visibility.iter().enumerate() {
         let surface = gbuffer.surface(&stage.scene, &stage.pose, i);
@@ -115,6 +137,11 @@ pub(crate) fn check_profile(means: &[[f64; 2]], within: f64) {
 
 /// Pictures of any size, of any camera and of nothing have values 0 … 1, the background is open, and threads change nothing.
 pub(crate) fn check_pictures(estimate: Estimate<'_>) {
+    check_pictures_of(&|shot| estimate(shot.screen));
+}
+
+/// The same for methods that draw the stage once more.
+pub(crate) fn check_pictures_of(estimate: EstimateShot<'_>) {
     let stage = still_life();
     let camera = look(Vec3::new(2.0, 2.5, 4.0), Vec3::ZERO);
     let from_below = look(Vec3::new(0.3, 0.1, 1.5), Vec3::new(0.2, 3.0, 0.0));
@@ -126,30 +153,44 @@ pub(crate) fn check_pictures(estimate: Estimate<'_>) {
     for size in [[1, 1], [3, 7], [7, 3], [1, 40], [33, 1], [64, 48], [65, 47]] {
         for camera in [&camera, &from_below, &parallel] {
             let (gbuffer, screen) = draw(&stage, camera, size);
-            let visibility = with_threads(1, || estimate(&screen));
+            let shot = Shot { stage: &stage, camera, gbuffer: &gbuffer, screen: &screen };
+            let visibility = with_threads(1, || estimate(&shot));
             assert_eq!(visibility.len(), (size[0] * size[1]) as usize);
             for (value, sample) in visibility.iter().zip(gbuffer.samples()) {
                 assert!((0.0..=1.0).contains(value), "{size:?}: {value}");
                 assert!(sample.is_covered() || *value == 1.0, "{size:?}: background {value}");
             }
-            assert_eq!(visibility, with_threads(3, || estimate(&screen)));
+            assert_eq!(visibility, with_threads(3, || estimate(&shot)));
         }
     }
-    let (_, screen) = draw(&Stage::new(), &camera, [5, 4]);
-    assert_eq!(estimate(&screen), [1.0; 20]);
+    let stage = Stage::new();
+    let (gbuffer, screen) = draw(&stage, &camera, [5, 4]);
+    let shot = Shot { stage: &stage, camera: &camera, gbuffer: &gbuffer, screen: &screen };
+    assert_eq!(estimate(&shot), [1.0; 20]);
 }
 
 /// The still life as a method sees it is its golden picture.
 pub(crate) fn check_golden_view(method: &str, name: &str, estimate: Estimate<'_>) {
+    check_golden_view_of(method, name, &|shot| estimate(shot.screen));
+}
+
+/// The same for methods that draw the stage once more.
+pub(crate) fn check_golden_view_of(method: &str, name: &str, estimate: EstimateShot<'_>) {
     let stage = still_life();
     let camera = look(Vec3::new(3.2, 2.4, 1.8), Vec3::new(0.5, 0.5, 0.0));
     let gbuffer = rasterize(&stage.scene, &stage.pose, &camera, 80, 60, 2).unwrap();
     let screen = gbuffer.screen(&stage.scene, &stage.pose, &camera).unwrap();
-    check_golden(method, name, &view_visibility(&gbuffer, &estimate(&screen)).unwrap());
+    let shot = Shot { stage: &stage, camera: &camera, gbuffer: &gbuffer, screen: &screen };
+    check_golden(method, name, &view_visibility(&gbuffer, &estimate(&shot)).unwrap());
 }
 
 /// A far camera with a narrow lens sees what a parallel one does, up to `mean`.
 pub(crate) fn check_lenses(estimate: Estimate<'_>, mean: f32) {
+    check_lenses_of(&|shot| estimate(shot.screen), mean);
+}
+
+/// The same for methods that draw the stage once more.
+pub(crate) fn check_lenses_of(estimate: EstimateShot<'_>, mean: f32) {
     let stage = still_life();
     let (direction, far_m, half_height) = (Vec3::new(0.5, 0.6, 1.0).normalize(), 2000.0, 2.0f64);
     let yfov = (2.0 * libm::atan(half_height / f64::from(far_m))) as f32;
@@ -162,8 +203,8 @@ pub(crate) fn check_lenses(estimate: Estimate<'_>, mean: f32) {
         ..look(direction * 10.0, Vec3::ZERO)
     };
     let [a, b] = [perspective, parallel].map(|camera| {
-        let (_, screen) = draw(&stage, &camera, [120, 90]);
-        estimate(&screen)
+        let (gbuffer, screen) = draw(&stage, &camera, [120, 90]);
+        estimate(&Shot { stage: &stage, camera: &camera, gbuffer: &gbuffer, screen: &screen })
     });
     let found = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).sum::<f32>() / a.len() as f32;
     assert!(found < mean, "{found}");

@@ -18,6 +18,8 @@ const KNOWN = [
   [/^psao-mls/, "green", "diamond"],
   [/^psao-hat/, "vermilion", "square"],
   [/^psao-paper|^paper/, "orange", "down"],
+  [/^sd-/, "vermilion", "square"],
+  [/-peeled$/, "gray", "diamond"],
   [/^(ssao|sao|alchemy)/, "olive", "bar"],
   [/^hbao/, "sky", "star"],
   [/^gtao/, "green", "diamond"],

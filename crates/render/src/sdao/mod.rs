@@ -1,0 +1,19 @@
+//! Stochastic depth: screen-space ambient occlusion that knows of surfaces behind the first ones.
+//!
+//! Draws a [`StochasticMap`] of a scene beside its G-buffer; [`ssao`](crate::ssao) and [`hbao`](crate::hbao) look into it. See `README.md`.
+
+mod bent;
+mod hidden;
+mod map;
+#[cfg(test)]
+mod measure;
+mod multi_view;
+mod picks;
+#[cfg(test)]
+mod tests;
+
+pub use bent::{BentNormals, bent_normals};
+pub use hidden::{Hidden, Looks, Lookup};
+pub use map::{MapParams, StochasticMap};
+pub use multi_view::{SideParams, SideView, estimate_visibility as estimate_visibility_of_two};
+pub use picks::Picks;
