@@ -384,7 +384,7 @@ impl Forward {
         pass.set_bind_group(2, &scene.group, &[]);
         let lookup = list.first().and_then(|draw| match draw.key.stage {
             Stage::Picture(lookup) => self.lookup_groups[lookup].as_ref(),
-            Stage::Geometry => None,
+            Stage::Geometry | Stage::Hidden => None,
         });
         if let Some(group) = lookup {
             pass.set_bind_group(3, group, &[]);

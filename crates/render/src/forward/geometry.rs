@@ -58,23 +58,7 @@ impl Forward {
             views.push((view, ViewCamera::new(&view, index, target.size)?));
         }
         scene.place(gpu, pose);
-        let shade = ShadeParams::default();
-        let inputs = FrameInputs {
-            pose,
-            shade: &shade,
-            tone_map: ToneMap::default(),
-            transparency: Transparency::Cutout,
-            fade: 1.0,
-            views: &[],
-        };
-        let mut bytes = vec![0u8; FRAME_STRIDE * views.len()];
-        for (slot, (view, camera)) in bytes.chunks_exact_mut(FRAME_STRIDE).zip(&views) {
-            let uniform = frame_uniform(&inputs, view, camera, 0);
-            slot[..size_of_val(&uniform)].copy_from_slice(bytemuck::bytes_of(&uniform));
-        }
-        self.geometry_frames.write(gpu, &bytes);
-        // Of small things one is made each time: shadow maps and this buffer come and go.
-        let group = frame_group(gpu, &self.frame_layout, &self.geometry_frames, &self.lights, &self.shadows);
+        let group = self.geometry_group(gpu, pose, &views);
         for (target, (_, camera)) in targets.iter().zip(&views) {
             let wants = Wants { stage: Stage::Geometry, blends: false, inspects: false };
             let list = self.list(gpu, scene, camera, wants);
@@ -102,5 +86,31 @@ impl Forward {
             self.run(&mut pass, scene, &group, camera, &list);
         }
         Ok(())
+    }
+
+    /// Group 0 of passes over views that light does not matter to. What it holds is written once an encoder.
+    pub(super) fn geometry_group(
+        &mut self,
+        gpu: &Gpu,
+        pose: &Pose,
+        views: &[(View<'_>, ViewCamera)],
+    ) -> wgpu::BindGroup {
+        let shade = ShadeParams::default();
+        let inputs = FrameInputs {
+            pose,
+            shade: &shade,
+            tone_map: ToneMap::default(),
+            transparency: Transparency::Cutout,
+            fade: 1.0,
+            views: &[],
+        };
+        let mut bytes = vec![0u8; FRAME_STRIDE * views.len()];
+        for (slot, (view, camera)) in bytes.chunks_exact_mut(FRAME_STRIDE).zip(views) {
+            let uniform = frame_uniform(&inputs, view, camera, 0);
+            slot[..size_of_val(&uniform)].copy_from_slice(bytemuck::bytes_of(&uniform));
+        }
+        self.geometry_frames.write(gpu, &bytes);
+        // Of small things one is made each time: shadow maps and this buffer come and go.
+        frame_group(gpu, &self.frame_layout, &self.geometry_frames, &self.lights, &self.shadows)
     }
 }

@@ -83,6 +83,16 @@ pub(super) fn surface(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     layout(device, "surface", &entries)
 }
 
+/// Group 3 of hidden surfaces: `hidden.wgsl`.
+pub(super) fn hidden(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let entries = [
+        (Stages::FRAGMENT, uniform(false)),
+        (Stages::FRAGMENT, texture(LOADED, Dimension::D2)),
+        (Stages::FRAGMENT, texture(wgpu::TextureSampleType::Uint, Dimension::D2)),
+    ];
+    layout(device, "hidden", &entries)
+}
+
 /// The two pictures that `error.wgsl` compares.
 pub(super) fn error(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     layout(device, "error", &[(Stages::FRAGMENT, texture(LOADED, Dimension::D2)); 2])

@@ -49,6 +49,18 @@ pub(super) fn geometry_module() -> String {
     ])
 }
 
+/// The files of the pass that draws the stochastic depth map.
+pub(super) fn hidden_module() -> String {
+    join(&[
+        FRAME_WGSL,
+        MATH_WGSL,
+        DEFORM_WGSL,
+        MATERIAL_WGSL,
+        include_str!("wgsl/vertex.wgsl"),
+        include_str!("wgsl/hidden.wgsl"),
+    ])
+}
+
 /// The files of the shadow maps.
 pub(super) fn caster_module() -> String {
     join(&[MATH_WGSL, DEFORM_WGSL, MATERIAL_WGSL, include_str!("wgsl/caster.wgsl")])
@@ -74,6 +86,8 @@ pub(super) enum Stage {
     Picture(usize),
     /// Normals and depths ([`super::geometry`]).
     Geometry,
+    /// Depths of hidden surfaces in four samples ([`super::hidden`]).
+    Hidden,
 }
 
 /// What tells one pipeline of the forward pass from another.
@@ -94,6 +108,7 @@ pub(super) struct Pipelines {
     format: wgpu::TextureFormat,
     samples: u32,
     lookups: Vec<Lookup>,
+    hidden_layout: wgpu::BindGroupLayout,
     /// Frame, material, surface.
     groups: [wgpu::BindGroupLayout; 3],
     /// Modules, each made when it is first needed: most pictures need one.
@@ -118,6 +133,7 @@ impl Pipelines {
             format,
             samples,
             lookups: lookups.to_vec(),
+            hidden_layout: layouts::hidden(device),
             stages: BTreeMap::new(),
             made: BTreeMap::new(),
             points: points(device, &groups[0], format, samples),
@@ -133,6 +149,7 @@ impl Pipelines {
                 (lookup.label, forward_module(lookup), lookup.needs_rest, lookup.layout.as_ref())
             }
             Stage::Geometry => ("geometry", geometry_module(), false, None),
+            Stage::Hidden => ("hidden", hidden_module(), false, Some(&self.hidden_layout)),
         };
         let layouts: Vec<_> = self.groups.iter().chain(own).map(Some).collect();
         StagePipelines {
@@ -168,7 +185,13 @@ impl Pipelines {
         let (format, samples) = match key.stage {
             Stage::Picture(_) => (self.format, self.samples),
             Stage::Geometry => (NORMAL_FORMAT, 1),
+            Stage::Hidden => (NORMAL_FORMAT, 4),
         };
+        let target = [Some(wgpu::ColorTargetState {
+            format,
+            blend: key.blends.then_some(wgpu::BlendState::ALPHA_BLENDING),
+            write_mask: wgpu::ColorWrites::ALL,
+        })];
         let flag = |on: bool| f64::from(u8::from(on));
         let rest = ("NEEDS_REST", flag(stage.needs_rest));
         let mut fragment_constants = vec![("CUTS_HOLES", flag(key.cuts_holes))];
@@ -197,11 +220,8 @@ impl Pipelines {
                 module: &stage.module,
                 entry_point: Some("fragment"),
                 compilation_options: options(&fragment_constants),
-                targets: &[Some(wgpu::ColorTargetState {
-                    format,
-                    blend: key.blends.then_some(wgpu::BlendState::ALPHA_BLENDING),
-                    write_mask: wgpu::ColorWrites::ALL,
-                })],
+                // Of hidden surfaces depths are all there is.
+                targets: if key.stage == Stage::Hidden { &[] } else { &target },
             }),
             multiview_mask: None,
             cache: None,

@@ -1,4 +1,4 @@
-// HBAO's and HBAO+'s sampling pass ([Vermeer2021] Alg. 2 and 3 without their stochastic part). The twin is `hbao`.
+// HBAO's and HBAO+'s sampling pass ([Vermeer2021] Alg. 2 and 3). The twin is `hbao`.
 
 struct HbaoParams {
     radius_m: f32,
@@ -9,10 +9,102 @@ struct HbaoParams {
     strength: f32,
     // 0 HBAO, 1 HBAO+.
     is_mean: u32,
-    pad: vec2<f32>,
+    // Layers of `hidden` that are read, where they are (LOOKS_), and what occlusion by them is multiplied by.
+    hidden_layers: u32,
+    looks: u32,
+    compensation: f32,
+    pad_a: f32,
+    pad_b: vec2<f32>,
 }
 
 @group(1) @binding(0) var<uniform> params: HbaoParams;
+
+// By how much what is seen so far away counts; 0 beyond the radius.
+fn falloff(to_seen: vec3<f32>) -> f32 {
+    let squared = dot(to_seen, to_seen);
+    return select(0.0, max(1.0 - squared / (params.radius_m * params.radius_m), 0.0), squared > 0.0);
+}
+
+// Alg. 3, lines 18 to 24: the greatest height over the surface, as a sine over a bias, by weight, of all that is known under a sample.
+fn height_at(seen: vec2<i32>, place: vec3<f32>, normal: vec3<f32>, sin_bias: f32) -> f32 {
+    let first = place_at(seen);
+    let to_first = first.xyz - place;
+    var value = 0.0;
+    var is_decided = false;
+    if first.w > 0.0 {
+        let weight = falloff(to_first);
+        let height = dot(normal, to_first);
+        if weight > 0.0 {
+            value = weight * max(height / length(to_first) - sin_bias, 0.0);
+        }
+        // Rays that come from below the plane may still rise over it.
+        let is_low = height <= sin_bias * length(to_first) && falls_on(first.xyz, normal);
+        is_decided = select(is_low, weight > 0.0, params.looks == LOOKS_WHERE_FIRST_IS_FAR) && params.looks != LOOKS_EVERYWHERE;
+    }
+    if is_decided {
+        return value;
+    }
+    var most = 0.0;
+    for (var layer = 0u; layer < params.hidden_layers; layer++) {
+        let four = textureLoad(hidden, seen, i32(layer), 0);
+        for (var i = 0; i < 4; i++) {
+            if !is_background(four[i]) {
+                let to_seen = place_view(centre(seen), four[i]) - place;
+                let weight = falloff(to_seen);
+                if weight > 0.0 {
+                    most = max(most, weight * (dot(normal, to_seen) * inverseSqrt(dot(to_seen, to_seen)) - sin_bias));
+                }
+            }
+        }
+    }
+    return max(value, params.compensation * most);
+}
+
+// What a place adds to the sum of a direction whose horizon is at a sine, and the sine that it raises that to; 0 where it does not.
+fn gain(to_seen: vec3<f32>, normal: vec3<f32>, sin_bias: f32, sine: f32) -> vec2<f32> {
+    let weight = falloff(to_seen);
+    let size = length(to_seen);
+    let found = to_seen.z / max(size, 1e-12);
+    // Samples lie beside the direction by up to half of one each way: the plane must not rise over itself for that.
+    let is_above = dot(normal, to_seen) > sin_bias * size;
+    return select(vec2(0.0), vec2(weight * (found - sine), found), is_above && found > sine && weight > 0.0);
+}
+
+// Alg. 2, lines 12 to 35, for one step: what is added, and the new horizon's sine.
+fn horizon_at(seen: vec2<i32>, place: vec3<f32>, normal: vec3<f32>, sin_bias: f32, sine: f32) -> vec2<f32> {
+    let first = place_at(seen);
+    let to_first = first.xyz - place;
+    var best = vec2(0.0, sine);
+    var is_decided = false;
+    if first.w > 0.0 {
+        let own = gain(to_first, normal, sin_bias, sine);
+        if own.x > 0.0 {
+            best = own;
+        }
+        let is_under = to_first.z <= sine * length(to_first);
+        let is_near = falloff(to_first) > 0.0 && params.looks == LOOKS_WHERE_FIRST_IS_FAR;
+        is_decided = params.looks != LOOKS_EVERYWHERE && (is_under || is_near);
+    }
+    if is_decided {
+        return best;
+    }
+    var most = vec2(0.0);
+    for (var layer = 0u; layer < params.hidden_layers; layer++) {
+        let four = textureLoad(hidden, seen, i32(layer), 0);
+        for (var i = 0; i < 4; i++) {
+            if !is_background(four[i]) {
+                let other = gain(place_view(centre(seen), four[i]) - place, normal, sin_bias, sine);
+                if other.x > most.x {
+                    most = other;
+                }
+            }
+        }
+    }
+    if most.x > best.x {
+        return vec2(params.compensation * most.x, most.y);
+    }
+    return best;
+}
 
 fn occlusion_at(at: vec2<i32>) -> f32 {
     let place = place_at(at);
@@ -42,24 +134,18 @@ fn occlusion_at(at: vec2<i32>) -> f32 {
             sine = sin(min(tangent + params.bias, 0.5 * PI));
         }
         for (var s = 0u; s < params.steps; s++) {
-            let seen = place_at(neighbour(at, direction * (step * (f32(s) + 0.5 + jitter))));
-            let to_seen = seen.xyz - place.xyz;
-            let squared = dot(to_seen, to_seen);
-            let part = squared / (params.radius_m * params.radius_m);
-            if seen.w == 0.0 || part >= 1.0 || squared <= 0.0 {
+            let seen = neighbour(at, direction * (step * (f32(s) + 0.5 + jitter)));
+            // Its own sample blocks nothing, and what is drawn twice differs in its last bits.
+            if !is_inside(seen) || all(seen == at) {
                 continue;
             }
-            let height = dot(normal, to_seen) * inverseSqrt(squared);
             if params.is_mean != 0u {
-                sum += (1.0 - part) * max(height - sin_bias, 0.0) / f32(params.steps);
+                sum += height_at(seen, place.xyz, normal, sin_bias) / f32(params.steps);
                 continue;
             }
-            let found = to_seen.z * inverseSqrt(squared);
-            // Samples lie beside the direction by up to half of one each way: the plane must not rise over itself for that.
-            if height > sin_bias && found > sine {
-                sum += (1.0 - part) * (found - sine);
-                sine = found;
-            }
+            let raised = horizon_at(seen, place.xyz, normal, sin_bias, sine);
+            sum += raised.x;
+            sine = raised.y;
         }
     }
     return sum / f32(params.directions);

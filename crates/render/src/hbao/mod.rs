@@ -282,6 +282,10 @@ impl<'a> Estimator<'a> {
             Some(weight * (centre.normal.dot(to_seen) / to_seen.length() - self.sin_bias).max(0.0))
         };
         let first = self.to_first(centre, index);
+        // Its own sample blocks nothing, and a card draws it twice with other last bits.
+        if first == Some(Vec3::ZERO) {
+            return 0.0;
+        }
         let seen = first.and_then(height);
         let is_decided = first.is_some_and(|first| match self.lookup.looks {
             Looks::Everywhere => false,

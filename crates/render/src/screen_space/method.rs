@@ -5,6 +5,7 @@ use crate::gbuffer::Screen;
 use crate::gtao::{self, GtaoParams};
 use crate::hbao::{self, HbaoParams, Horizon};
 use crate::sao::{self, SaoParams};
+use crate::sdao::{Hidden, Looks, Lookup, MapParams, StochasticMap};
 use crate::ssao::{self, SsaoParams};
 use crate::{Chosen, Preset, RenderError};
 
@@ -23,17 +24,26 @@ pub enum ScreenKind {
     HbaoPlus,
     /// GTAO with a visibility bitmask.
     Gtao,
+    /// SSAO over a stochastic depth map of four samples.
+    SdSsao,
+    /// HBAO over such a map.
+    SdHbao,
+    /// HBAO+ over such a map.
+    SdHbaoPlus,
 }
 
 impl ScreenKind {
     /// All, the simplest first.
-    pub const ALL: [ScreenKind; 6] = [
+    pub const ALL: [ScreenKind; 9] = [
         ScreenKind::Ssao,
         ScreenKind::Alchemy,
         ScreenKind::Sao,
         ScreenKind::Hbao,
         ScreenKind::HbaoPlus,
         ScreenKind::Gtao,
+        ScreenKind::SdSsao,
+        ScreenKind::SdHbao,
+        ScreenKind::SdHbaoPlus,
     ];
 
     /// As programs name it: lower case, words joined by hyphens.
@@ -45,6 +55,9 @@ impl ScreenKind {
             ScreenKind::Hbao => "hbao",
             ScreenKind::HbaoPlus => "hbao-plus",
             ScreenKind::Gtao => "gtao",
+            ScreenKind::SdSsao => "sd-ssao",
+            ScreenKind::SdHbao => "sd-hbao",
+            ScreenKind::SdHbaoPlus => "sd-hbao-plus",
         }
     }
 
@@ -55,6 +68,7 @@ impl ScreenKind {
 
     /// With a preset's parameters, and the resolution that they are meant for.
     pub fn preset(self, preset: Preset) -> Chosen<ScreenMethod> {
+        let stochastic = |layered| ScreenMethod::Stochastic(layered, StochasticParams::default());
         fn of<P>(chosen: Chosen<P>, method: impl Fn(P) -> ScreenMethod) -> Chosen<ScreenMethod> {
             Chosen { params: method(chosen.params), half_resolution: chosen.half_resolution }
         }
@@ -65,6 +79,9 @@ impl ScreenKind {
             ScreenKind::Hbao => of(preset.hbao(), ScreenMethod::Hbao),
             ScreenKind::HbaoPlus => of(preset.hbao_plus(), ScreenMethod::Hbao),
             ScreenKind::Gtao => of(preset.gtao(), ScreenMethod::Gtao),
+            ScreenKind::SdSsao => of(preset.ssao(), |params| stochastic(Layered::Ssao(params))),
+            ScreenKind::SdHbao => of(preset.hbao(), |params| stochastic(Layered::Hbao(params))),
+            ScreenKind::SdHbaoPlus => of(preset.hbao_plus(), |params| stochastic(Layered::Hbao(params))),
         }
     }
 }
@@ -82,6 +99,49 @@ pub enum ScreenMethod {
     Hbao(HbaoParams),
     /// GTAO with a visibility bitmask.
     Gtao(GtaoParams),
+    /// A method over a stochastic depth map.
+    Stochastic(Layered, StochasticParams),
+}
+
+/// A method that can look behind the first surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Layered {
+    /// Random places in a hemisphere.
+    Ssao(SsaoParams),
+    /// HBAO or HBAO+.
+    Hbao(HbaoParams),
+}
+
+/// Which hidden surfaces there are, and what is made of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StochasticParams {
+    /// The map.
+    pub map: MapParams,
+    /// Where it is looked at.
+    pub looks: Looks,
+    /// What occlusion by hidden surfaces is multiplied by, 0 … 16; default 1.
+    pub compensation: f32,
+}
+
+impl Default for StochasticParams {
+    fn default() -> Self {
+        StochasticParams { map: MapParams::default(), looks: Looks::default(), compensation: 1.0 }
+    }
+}
+
+impl StochasticParams {
+    /// Whether every parameter is in its range.
+    ///
+    /// # Errors
+    /// Names the first that is not.
+    pub fn check(&self) -> Result<(), RenderError> {
+        self.map.check()?;
+        if !(0.0..=16.0).contains(&self.compensation) {
+            let found = self.compensation.into();
+            return Err(RenderError::Parameter { name: "sdao: compensation", found, range: "0 to 16" });
+        }
+        Ok(())
+    }
 }
 
 impl ScreenMethod {
@@ -94,6 +154,11 @@ impl ScreenMethod {
             ScreenMethod::Hbao(HbaoParams { horizon: Horizon::Highest, .. }) => ScreenKind::Hbao,
             ScreenMethod::Hbao(HbaoParams { horizon: Horizon::Mean, .. }) => ScreenKind::HbaoPlus,
             ScreenMethod::Gtao(_) => ScreenKind::Gtao,
+            ScreenMethod::Stochastic(Layered::Ssao(_), _) => ScreenKind::SdSsao,
+            ScreenMethod::Stochastic(Layered::Hbao(params), _) => match params.horizon {
+                Horizon::Highest => ScreenKind::SdHbao,
+                Horizon::Mean => ScreenKind::SdHbaoPlus,
+            },
         }
     }
 
@@ -105,6 +170,13 @@ impl ScreenMethod {
             ScreenMethod::Sao(params) => ScreenMethod::Sao(SaoParams { radius_m, ..params }),
             ScreenMethod::Hbao(params) => ScreenMethod::Hbao(HbaoParams { radius_m, ..params }),
             ScreenMethod::Gtao(params) => ScreenMethod::Gtao(GtaoParams { radius_m, ..params }),
+            ScreenMethod::Stochastic(layered, stochastic) => {
+                let layered = match layered {
+                    Layered::Ssao(params) => Layered::Ssao(SsaoParams { radius_m, ..params }),
+                    Layered::Hbao(params) => Layered::Hbao(HbaoParams { radius_m, ..params }),
+                };
+                ScreenMethod::Stochastic(layered, stochastic)
+            }
         }
     }
 
@@ -119,20 +191,42 @@ impl ScreenMethod {
             ScreenMethod::Sao(params) => params.check(),
             ScreenMethod::Hbao(params) => params.check(),
             ScreenMethod::Gtao(params) => params.check(),
+            ScreenMethod::Stochastic(layered, stochastic) => {
+                stochastic.check()?;
+                match layered {
+                    Layered::Ssao(params) => params.check(),
+                    Layered::Hbao(params) => params.check(),
+                }
+            }
         }
     }
 
-    /// Visibility 0 … 1 of each sample of a picture, row-major from the top, 1 for the background: the method's own `estimate_visibility`.
+    /// Visibility 0 … 1 of each sample of a picture, row-major from the top, 1 for the background: the method's own `estimate_visibility`. A stochastic method is given
+    /// its map; the others need none.
     ///
     /// # Errors
-    /// A parameter out of its range.
-    pub fn estimate_visibility(&self, screen: &Screen) -> Result<Vec<f32>, RenderError> {
+    /// A parameter out of its range, or a map of another picture, or none where one is needed.
+    pub fn estimate_visibility(
+        &self,
+        screen: &Screen,
+        map: Option<&StochasticMap>,
+    ) -> Result<Vec<f32>, RenderError> {
         match self {
             ScreenMethod::Ssao(params) => ssao::estimate_visibility(screen, params),
             ScreenMethod::Alchemy(params) => alchemy::estimate_visibility(screen, params),
             ScreenMethod::Sao(params) => sao::estimate_visibility(screen, params),
             ScreenMethod::Hbao(params) => hbao::estimate_visibility(screen, params),
             ScreenMethod::Gtao(params) => gtao::estimate_visibility(screen, params),
+            ScreenMethod::Stochastic(layered, stochastic) => {
+                RenderError::check_length("stochastic maps", usize::from(map.is_some()), 1)?;
+                let hidden = map.map_or(Hidden::Nothing, Hidden::Stochastic);
+                let StochasticParams { looks, compensation, .. } = *stochastic;
+                let lookup = Lookup { hidden, looks, compensation };
+                match layered {
+                    Layered::Ssao(params) => ssao::estimate_visibility_with(screen, params, &lookup),
+                    Layered::Hbao(params) => hbao::estimate_visibility_with(screen, params, &lookup),
+                }
+            }
         }
     }
 }

@@ -11,6 +11,6 @@ mod tests;
 #[cfg(feature = "gpu")]
 mod uniforms;
 
-pub use method::{ScreenKind, ScreenMethod};
+pub use method::{Layered, ScreenKind, ScreenMethod, StochasticParams};
 #[cfg(feature = "gpu")]
 pub use passes::{ScreenPasses, ScreenView};

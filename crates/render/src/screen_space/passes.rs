@@ -6,9 +6,12 @@ use dapple_gpu::{Gpu, shader_module, wgpu};
 use dapple_scene::{Pose, PosedCamera};
 
 use super::method::ScreenMethod;
-use super::plan::{Image, Pass, Shader, level_size, levels, passes, seen_size};
+use super::plan::{Image, Pass, Shader, hidden_layers, level_size, levels, passes, seen_size};
 use super::uniforms::ScreenUniform;
-use crate::forward::{Forward, ForwardError, GeometryTarget, GpuScene, Lookup, LookupId};
+use crate::forward::{
+    Forward, ForwardError, GeometryTarget, GpuScene, HIDDEN_SAMPLES, HiddenChoice, HiddenTarget, Lookup,
+    LookupId,
+};
 use crate::gbuffer::GuardBand;
 use crate::sao::MAX_LEVELS;
 
@@ -17,12 +20,15 @@ use crate::sao::MAX_LEVELS;
 #[derive(Debug)]
 pub struct ScreenPasses {
     lookup: LookupId,
-    layouts: [wgpu::BindGroupLayout; 2],
+    /// Of the picture, of a pass, and of the one that reads the stochastic map.
+    layouts: [wgpu::BindGroupLayout; 3],
     lookup_layout: wgpu::BindGroupLayout,
-    layout: wgpu::PipelineLayout,
     pipelines: BTreeMap<(Shader, Image), wgpu::RenderPipeline>,
     /// What passes bind that write the distances themselves.
     blank: wgpu::TextureView,
+    /// What methods bind that know nothing of hidden surfaces.
+    nothing_hidden: wgpu::TextureView,
+    choice: Option<HiddenChoice>,
     /// Of the whole picture, and of half its resolution.
     screens: [wgpu::Buffer; 2],
     plan: Option<Plan>,
@@ -62,8 +68,12 @@ struct Plan {
     view: ScreenView,
     normals: wgpu::TextureView,
     depths: wgpu::TextureView,
+    /// Depths of the stochastic map, four samples each.
+    maps: Vec<wgpu::TextureView>,
     steps: Vec<Step>,
     picture: wgpu::Texture,
+    #[cfg(test)]
+    hidden: wgpu::Texture,
 }
 
 #[derive(Debug)]
@@ -103,20 +113,17 @@ impl ScreenPasses {
         }
         let device = &gpu.device;
         let layouts = [
-            layout(device, "screen", &[UNIFORM, TEXTURE, TEXTURE]),
-            layout(device, "screen pass", &[UNIFORM, TEXTURE]),
+            layout(device, "screen", &[(0, UNIFORM), (1, TEXTURE), (2, TEXTURE)]),
+            layout(device, "screen pass", &[(0, UNIFORM), (1, TEXTURE), (2, TEXTURES)]),
+            layout(device, "stochastic map", &[(0, UNIFORM), (3, SAMPLED_DEPTHS)]),
         ];
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("screen"),
-            bind_group_layouts: &layouts.each_ref().map(Some),
-            immediate_size: 0,
-        });
         Ok(ScreenPasses {
             lookup,
-            layout: pipeline_layout,
             lookup_layout: lookup_layout(device),
             pipelines: BTreeMap::new(),
             blank: texture(gpu, Image::Distances(0).format(), (1, 1), 1).create_view(&Default::default()),
+            nothing_hidden: array_view(&hidden_texture(gpu, (1, 1), 0)),
+            choice: None,
             screens: [(); 2].map(|()| {
                 device.create_buffer(&wgpu::BufferDescriptor {
                     label: Some("screen"),
@@ -173,6 +180,18 @@ impl ScreenPasses {
             let reason = "the picture has no pixels, or with its guard band more than the device allows: make it smaller";
             return Err(ForwardError::Frame { reason });
         }
+        let map = match &view.method {
+            ScreenMethod::Stochastic(_, stochastic) => Some(&stochastic.map),
+            _ => None,
+        };
+        if map.is_some() && !can_draw_maps(gpu) {
+            let reason = "this device cannot read samples of depths, which a stochastic depth map needs \
+                          (WebGL2 never can): choose a method without sd- in its name";
+            return Err(ForwardError::Frame { reason });
+        }
+        if let Some(map) = map.filter(|map| self.choice.as_ref().map(HiddenChoice::params) != Some(map)) {
+            self.choice = Some(HiddenChoice::new(gpu, map));
+        }
         let is_current = self.plan.as_ref().is_some_and(|plan| plan.serves(view));
         if !is_current {
             self.plan = Some(self.make_plan(gpu, view));
@@ -182,13 +201,21 @@ impl ScreenPasses {
         let size = (width, height);
         let target = GeometryTarget { camera, size, normals: &plan.normals, depths: &plan.depths };
         forward.draw_geometry(gpu, encoder, scene, pose, &[target])?;
+        for (depths, index) in plan.maps.iter().zip(0..) {
+            let Some(choice) = &self.choice else { break };
+            let first_sample = index * HIDDEN_SAMPLES;
+            let target = HiddenTarget { camera, size, first_depths: &plan.depths, depths, first_sample };
+            forward.draw_hidden(gpu, encoder, scene, pose, choice, &target)?;
+        }
         let full = ScreenUniform::new(&camera, size);
         for (buffer, uniform) in self.screens.iter().zip([full, full.half()]) {
             gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&uniform));
         }
         let view = plan.picture.create_view(&Default::default());
-        forward
-            .bind_lookup(self.lookup, group(&gpu.device, &self.lookup_layout, &[Resource::Texture(&view)]));
+        forward.bind_lookup(
+            self.lookup,
+            group(&gpu.device, &self.lookup_layout, &[(0, Resource::Texture(&view))]),
+        );
         Ok(())
     }
 
@@ -226,6 +253,12 @@ impl ScreenPasses {
         self.plan.as_ref().map(|plan| &plan.picture)
     }
 
+    /// Distances of the last picture's hidden surfaces, metres: four a texel and layer, 1e30 where there is none.
+    #[cfg(test)]
+    pub(super) fn hidden(&self) -> Option<&wgpu::Texture> {
+        self.plan.as_ref().map(|plan| &plan.hidden)
+    }
+
     fn make_plan(&mut self, gpu: &Gpu, view: &ScreenView) -> Plan {
         let [width, height] = view.guarded();
         let full = (width, height);
@@ -240,7 +273,8 @@ impl ScreenPasses {
             Image::Picture => view.size,
             Image::Depths | Image::Normals | Image::FullDistances => full,
             Image::Distances(level) => level_size(seen, level),
-            Image::HalfNormals | Image::Value(_) | Image::Packed(_) => seen,
+            Image::Map(_) => full,
+            Image::HalfNormals | Image::Value(_) | Image::Packed(_) | Image::Hidden(_) => seen,
         };
         let passes = passes(&view.method, full, view.guard.pixels(), view.half_resolution);
         let mut views: BTreeMap<Image, wgpu::TextureView> = BTreeMap::new();
@@ -252,6 +286,19 @@ impl ScreenPasses {
                 ..Default::default()
             };
             views.insert(Image::Distances(level), distances.create_view(&descriptor));
+        }
+        let layers = hidden_layers(&view.method);
+        let hidden = hidden_texture(gpu, if layers > 0 { seen } else { (1, 1) }, layers);
+        let all_hidden = array_view(&hidden);
+        for layer in 0..layers {
+            let descriptor = wgpu::TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2),
+                base_array_layer: layer,
+                array_layer_count: Some(1),
+                ..Default::default()
+            };
+            views.insert(Image::Hidden(layer), hidden.create_view(&descriptor));
+            views.insert(Image::Map(layer), map_view(gpu, full));
         }
         let named = passes.iter().flat_map(|pass| pass.reads.into_iter().chain([pass.writes]));
         for image in named.chain([Image::Normals]) {
@@ -265,15 +312,16 @@ impl ScreenPasses {
             let is_half = view.half_resolution && writes != Image::Picture;
             let distances = match (shader, view.half_resolution) {
                 // What they write themselves cannot be read.
-                (Shader::Distance | Shader::Minify | Shader::Halve, _) => &self.blank,
+                (Shader::Distance | Shader::Minify | Shader::Halve | Shader::Resolve, _) => &self.blank,
                 (Shader::Place, true) => &views[&Image::FullDistances],
                 _ => &all_distances,
             };
             let normals = match shader {
-                Shader::Distance | Shader::Minify | Shader::Halve => &self.blank,
+                Shader::Distance | Shader::Minify | Shader::Halve | Shader::Resolve => &self.blank,
                 _ if is_half => &views[&Image::HalfNormals],
                 _ => &views[&Image::Normals],
             };
+            let is_looking = matches!(shader, Shader::Ssao | Shader::Hbao) && layers > 0;
             let uniform = gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(shader.label()),
                 size: params.len() as u64,
@@ -283,10 +331,23 @@ impl ScreenPasses {
             gpu.queue.write_buffer(&uniform, 0, &params);
             let before = reads.map_or(&self.blank, |image| &views[&image]);
             let screen = &self.screens[usize::from(is_half)];
-            let own = [Resource::Uniform(screen), Resource::Texture(distances), Resource::Texture(normals)];
-            let passed = [Resource::Uniform(&uniform), Resource::Texture(before)];
-            let groups =
-                [group(&gpu.device, &self.layouts[0], &own), group(&gpu.device, &self.layouts[1], &passed)];
+            let own = [
+                (0, Resource::Uniform(screen)),
+                (1, Resource::Texture(distances)),
+                (2, Resource::Texture(normals)),
+            ];
+            let passed = match shader {
+                Shader::Resolve => vec![(0, Resource::Uniform(&uniform)), (3, Resource::Texture(before))],
+                _ => vec![
+                    (0, Resource::Uniform(&uniform)),
+                    (1, Resource::Texture(before)),
+                    (2, Resource::Texture(if is_looking { &all_hidden } else { &self.nothing_hidden })),
+                ],
+            };
+            let groups = [
+                group(&gpu.device, &self.layouts[0], &own),
+                group(&gpu.device, self.pass_layout(shader), &passed),
+            ];
             steps.push(Step {
                 label: shader.label(),
                 target: views[&writes].clone(),
@@ -296,7 +357,22 @@ impl ScreenPasses {
             });
         }
         let [normals, depths] = [Image::Normals, Image::Depths].map(|image| views[&image].clone());
-        Plan { view: *view, normals, depths, steps, picture }
+        let maps = (0..layers).map(|layer| views[&Image::Map(layer)].clone()).collect();
+        Plan {
+            view: *view,
+            normals,
+            depths,
+            maps,
+            steps,
+            picture,
+            #[cfg(test)]
+            hidden,
+        }
+    }
+
+    /// Layout of a pass's own group.
+    fn pass_layout(&self, shader: Shader) -> &wgpu::BindGroupLayout {
+        if shader == Shader::Resolve { &self.layouts[2] } else { &self.layouts[1] }
     }
 
     fn pipeline(&mut self, gpu: &Gpu, shader: Shader, writes: Image) -> wgpu::RenderPipeline {
@@ -310,12 +386,17 @@ impl ScreenPasses {
                 other => other,
             },
         );
+        let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("screen"),
+            bind_group_layouts: &[Some(&self.layouts[0]), Some(self.pass_layout(shader))],
+            immediate_size: 0,
+        });
         let made = self.pipelines.entry(key).or_insert_with(|| {
             let (wgsl, entry) = shader.module();
             let module = shader_module(&gpu.device, shader.label(), &wgsl);
             gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(shader.label()),
-                layout: Some(&self.layout),
+                layout: Some(&layout),
                 vertex: wgpu::VertexState {
                     module: &module,
                     entry_point: Some("screen_vertex"),
@@ -353,10 +434,21 @@ const TEXTURE: wgpu::BindingType = wgpu::BindingType::Texture {
     multisampled: false,
 };
 
-fn layout(device: &wgpu::Device, label: &str, types: &[wgpu::BindingType]) -> wgpu::BindGroupLayout {
-    let entries: Vec<_> = (0..)
-        .zip(types)
-        .map(|(binding, &ty)| wgpu::BindGroupLayoutEntry {
+const TEXTURES: wgpu::BindingType = wgpu::BindingType::Texture {
+    sample_type: wgpu::TextureSampleType::Float { filterable: false },
+    view_dimension: wgpu::TextureViewDimension::D2Array,
+    multisampled: false,
+};
+const SAMPLED_DEPTHS: wgpu::BindingType = wgpu::BindingType::Texture {
+    sample_type: wgpu::TextureSampleType::Depth,
+    view_dimension: wgpu::TextureViewDimension::D2,
+    multisampled: true,
+};
+
+fn layout(device: &wgpu::Device, label: &str, types: &[(u32, wgpu::BindingType)]) -> wgpu::BindGroupLayout {
+    let entries: Vec<_> = types
+        .iter()
+        .map(|&(binding, ty)| wgpu::BindGroupLayoutEntry {
             binding,
             visibility: wgpu::ShaderStages::FRAGMENT,
             ty,
@@ -368,7 +460,7 @@ fn layout(device: &wgpu::Device, label: &str, types: &[wgpu::BindingType]) -> wg
 }
 
 fn lookup_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    layout(device, "screen space", &[TEXTURE])
+    layout(device, "screen space", &[(0, TEXTURE)])
 }
 
 enum Resource<'a> {
@@ -379,12 +471,12 @@ enum Resource<'a> {
 fn group(
     device: &wgpu::Device,
     layout: &wgpu::BindGroupLayout,
-    resources: &[Resource<'_>],
+    resources: &[(u32, Resource<'_>)],
 ) -> wgpu::BindGroup {
-    let entries: Vec<_> = (0..)
-        .zip(resources)
+    let entries: Vec<_> = resources
+        .iter()
         .map(|(binding, resource)| wgpu::BindGroupEntry {
-            binding,
+            binding: *binding,
             resource: match resource {
                 Resource::Uniform(buffer) => buffer.as_entire_binding(),
                 Resource::Texture(view) => wgpu::BindingResource::TextureView(view),
@@ -392,6 +484,56 @@ fn group(
         })
         .collect();
     device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
+}
+
+/// Distances of hidden surfaces, four a texel.
+fn hidden_texture(gpu: &Gpu, (width, height): (u32, u32), layers: u32) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("hidden"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: layers.max(2) },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: Image::Hidden(0).format(),
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT
+            | wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    })
+}
+
+fn array_view(texture: &wgpu::Texture) -> wgpu::TextureView {
+    texture.create_view(&wgpu::TextureViewDescriptor {
+        dimension: Some(wgpu::TextureViewDimension::D2Array),
+        ..Default::default()
+    })
+}
+
+/// Depths in four samples a pixel.
+fn map_view(gpu: &Gpu, (width, height): (u32, u32)) -> wgpu::TextureView {
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("stochastic map"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: HIDDEN_SAMPLES,
+        dimension: wgpu::TextureDimension::D2,
+        format: Image::Map(0).format(),
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    });
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+/// Whether the device can make a stochastic map.
+fn can_draw_maps(gpu: &Gpu) -> bool {
+    let features = |format| gpu.adapter.get_texture_format_features(format);
+    let depths = features(Image::Map(0).format());
+    let distances = features(Image::Hidden(0).format());
+    let flags = gpu.adapter.get_downlevel_capabilities().flags;
+    flags.contains(wgpu::DownlevelFlags::MULTISAMPLED_SHADING)
+        && depths.flags.sample_count_supported(HIDDEN_SAMPLES)
+        && depths.allowed_usages.contains(wgpu::TextureUsages::TEXTURE_BINDING)
+        && distances.allowed_usages.contains(wgpu::TextureUsages::RENDER_ATTACHMENT)
 }
 
 fn texture(

@@ -2,19 +2,21 @@
 
 use dapple_gpu::{join, wgpu};
 
-use super::method::ScreenMethod;
+use super::method::{Layered, ScreenMethod, StochasticParams};
 use super::uniforms::*;
 use crate::alchemy::AlchemyParams;
 use crate::bilateral::Bilateral;
-use crate::forward::GeometryTarget;
+use crate::forward::{GeometryTarget, HIDDEN_SAMPLES};
 use crate::gtao::GtaoParams;
 use crate::hbao::{HbaoParams, Horizon};
 use crate::obscurance::Obscurance;
 use crate::sao::{MipFilter, SaoParams};
+use crate::sdao::Looks;
 use crate::ssao::SsaoParams;
 
 pub(super) const SCREEN_WGSL: &str = include_str!("wgsl/screen.wgsl");
 const NOISE_WGSL: &str = include_str!("wgsl/noise.wgsl");
+const HIDDEN_WGSL: &str = include_str!("../sdao/hidden.wgsl");
 const OBSCURANCE_WGSL: &str = include_str!("../obscurance.wgsl");
 
 /// One fragment stage over the whole picture.
@@ -22,6 +24,8 @@ const OBSCURANCE_WGSL: &str = include_str!("../obscurance.wgsl");
 pub(super) enum Shader {
     Distance,
     Halve,
+    /// Four samples of the stochastic map.
+    Resolve,
     Minify,
     Ssao,
     SsaoBlur,
@@ -59,6 +63,7 @@ impl Shader {
         match self {
             Shader::Distance => "distances",
             Shader::Halve => "half",
+            Shader::Resolve => "map",
             Shader::Minify => "levels",
             Shader::Ssao | Shader::Alchemy | Shader::Sao { .. } | Shader::Hbao | Shader::Gtao => "samples",
             Shader::SsaoBlur | Shader::Bilateral | Shader::Reconstruct => "blur",
@@ -72,7 +77,8 @@ impl Shader {
             Shader::Distance => (&[include_str!("wgsl/distance.wgsl")], "distance_fragment"),
             Shader::Halve => (&[include_str!("wgsl/halve.wgsl")], "halve_fragment"),
             Shader::Minify => (&[include_str!("../sao/minify.wgsl")], "minify_fragment"),
-            Shader::Ssao => (&[include_str!("../ssao/ssao.wgsl")], "ssao_fragment"),
+            Shader::Resolve => (&[include_str!("../sdao/resolve.wgsl")], "resolve_fragment"),
+            Shader::Ssao => (&[HIDDEN_WGSL, include_str!("../ssao/ssao.wgsl")], "ssao_fragment"),
             Shader::SsaoBlur => (&[include_str!("../ssao/blur.wgsl")], "blur_fragment"),
             Shader::Alchemy => {
                 (&[NOISE_WGSL, OBSCURANCE_WGSL, include_str!("../alchemy/alchemy.wgsl")], "alchemy_fragment")
@@ -81,7 +87,7 @@ impl Shader {
                 (&[NOISE_WGSL, OBSCURANCE_WGSL, include_str!("../sao/sample.wgsl")], "sao_fragment")
             }
             Shader::Reconstruct => (&[include_str!("../sao/reconstruct.wgsl")], "reconstruct_fragment"),
-            Shader::Hbao => (&[NOISE_WGSL, include_str!("../hbao/hbao.wgsl")], "hbao_fragment"),
+            Shader::Hbao => (&[NOISE_WGSL, HIDDEN_WGSL, include_str!("../hbao/hbao.wgsl")], "hbao_fragment"),
             Shader::Gtao => (&[NOISE_WGSL, include_str!("../gtao/gtao.wgsl")], "gtao_fragment"),
             Shader::Bilateral => (&[include_str!("wgsl/bilateral.wgsl")], "bilateral_fragment"),
             Shader::Place => (&[include_str!("wgsl/place.wgsl")], "place_fragment"),
@@ -111,6 +117,10 @@ pub(super) enum Image {
     Distances(u32),
     /// Normals at half resolution.
     HalfNormals,
+    /// Four samples of the stochastic map, as depths.
+    Map(u32),
+    /// The same as distances.
+    Hidden(u32),
     /// One value a sample, in turns.
     Value(usize),
     /// Value and distance in bytes, in turns.
@@ -122,7 +132,8 @@ pub(super) enum Image {
 impl Image {
     pub(super) fn format(self) -> wgpu::TextureFormat {
         match self {
-            Image::Depths => GeometryTarget::DEPTH_FORMAT,
+            Image::Depths | Image::Map(_) => GeometryTarget::DEPTH_FORMAT,
+            Image::Hidden(_) => wgpu::TextureFormat::Rgba32Float,
             Image::Distances(_) | Image::FullDistances => wgpu::TextureFormat::R32Float,
             Image::Normals | Image::HalfNormals => GeometryTarget::NORMAL_FORMAT,
             Image::Value(_) => wgpu::TextureFormat::R16Float,
@@ -157,6 +168,14 @@ pub(super) fn levels(method: &ScreenMethod, size: (u32, u32)) -> u32 {
     params.levels.min(longest.next_power_of_two().ilog2())
 }
 
+/// Textures of four samples that a method's stochastic map takes.
+pub(super) fn hidden_layers(method: &ScreenMethod) -> u32 {
+    match method {
+        ScreenMethod::Stochastic(_, stochastic) => stochastic.map.samples.div_ceil(HIDDEN_SAMPLES),
+        _ => 0,
+    }
+}
+
 /// Columns and rows that a method sees of a picture.
 pub(super) fn seen_size(size: (u32, u32), half_resolution: bool) -> (u32, u32) {
     if half_resolution { level_size(size, 1) } else { size }
@@ -178,11 +197,25 @@ pub(super) fn passes(
     }
     let size = seen_size(full_size, half_resolution);
     let last = match method {
-        ScreenMethod::Ssao(params) => ssao(params, &mut all),
+        ScreenMethod::Ssao(params) => ssao(params, None, &mut all),
         ScreenMethod::Alchemy(params) => alchemy(params, &mut all),
         ScreenMethod::Sao(params) => sao(params, size, levels(method, size), &mut all),
-        ScreenMethod::Hbao(params) => hbao(params, &mut all),
+        ScreenMethod::Hbao(params) => hbao(params, None, &mut all),
         ScreenMethod::Gtao(params) => gtao(params, &mut all),
+        ScreenMethod::Stochastic(layered, stochastic) => {
+            for layer in 0..hidden_layers(method) {
+                let params = ResolveUniform {
+                    full_size: [full_size.0 as i32, full_size.1 as i32],
+                    is_half: u32::from(half_resolution),
+                    pad: 0,
+                };
+                all.push(pass(Shader::Resolve, Some(Image::Map(layer)), Image::Hidden(layer), params));
+            }
+            match layered {
+                Layered::Ssao(params) => ssao(params, Some(stochastic), &mut all),
+                Layered::Hbao(params) => hbao(params, Some(stochastic), &mut all),
+            }
+        }
     };
     let is_half = u32::from(half_resolution);
     let params = PlaceUniform { guard: [guard as i32; 2], is_half, pad: 0.0 };
@@ -192,13 +225,16 @@ pub(super) fn passes(
 
 const AXES: [[i32; 2]; 2] = [[1, 0], [0, 1]];
 
-fn ssao(params: &SsaoParams, all: &mut Vec<Pass>) -> Image {
+fn ssao(params: &SsaoParams, hidden: Option<&StochasticParams>, all: &mut Vec<Pass>) -> Image {
     let (offsets, turns) = crate::ssao::pattern(params);
     let mut uniform = SsaoUniform {
         radius_m: params.radius_m,
         samples: params.samples,
         height_m: params.bias * params.radius_m,
-        pad: 0.0,
+        hidden_layers: hidden.map_or(0, |hidden| hidden.map.samples.div_ceil(HIDDEN_SAMPLES)),
+        compensation: hidden.map_or(1.0, |hidden| hidden.compensation),
+        pad_a: 0.0,
+        pad_b: [0.0; 2],
         offsets: [[0.0; 4]; 256],
         turns: [[0.0; 4]; 128],
     };
@@ -286,7 +322,7 @@ fn sao(params: &SaoParams, size: (u32, u32), levels: u32, all: &mut Vec<Pass>) -
     Image::Value(0)
 }
 
-fn hbao(params: &HbaoParams, all: &mut Vec<Pass>) -> Image {
+fn hbao(params: &HbaoParams, hidden: Option<&StochasticParams>, all: &mut Vec<Pass>) -> Image {
     let uniform = HbaoUniform {
         radius_m: params.radius_m,
         directions: params.directions,
@@ -294,7 +330,15 @@ fn hbao(params: &HbaoParams, all: &mut Vec<Pass>) -> Image {
         bias: params.bias_degrees.to_radians(),
         strength: params.strength,
         is_mean: u32::from(params.horizon == Horizon::Mean),
-        pad: [0.0; 2],
+        hidden_layers: hidden.map_or(0, |hidden| hidden.map.samples.div_ceil(HIDDEN_SAMPLES)),
+        looks: match hidden.map_or(Looks::default(), |hidden| hidden.looks) {
+            Looks::Everywhere => 0,
+            Looks::WhereFirstIsFar => 1,
+            Looks::WhereFirstRises => 2,
+        },
+        compensation: hidden.map_or(1.0, |hidden| hidden.compensation),
+        pad_a: 0.0,
+        pad_b: [0.0; 2],
     };
     all.push(pass(Shader::Hbao, None, Image::Value(0), uniform));
     bilateral(params.radius_m, params.blur_taps, all)

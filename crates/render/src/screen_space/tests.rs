@@ -12,10 +12,13 @@ use glam::Vec3;
 
 use super::plan::Shader;
 use super::uniforms::*;
-use super::{ScreenKind, ScreenMethod, ScreenPasses, ScreenView};
+use super::{Layered, ScreenKind, ScreenMethod, ScreenPasses, ScreenView, StochasticParams};
 use crate::forward::{Forward, GpuScene, GpuSceneOptions, LookupId};
 use crate::gbuffer::GuardBand;
+use crate::gbuffer::rasterize;
+use crate::hbao::HbaoParams;
 use crate::sao::{MipFilter, SaoParams};
+use crate::sdao::{Looks, MapParams, Picks, StochasticMap};
 use crate::testing::Stage;
 use crate::testing::screen::{look, still_life};
 use crate::upsample::at_half_resolution;
@@ -25,6 +28,10 @@ fn every_pass_is_valid_and_within_webgl2() {
     for shader in Shader::ALL {
         let (wgsl, entry) = shader.module();
         let module = validate(&wgsl).unwrap_or_else(|e| panic!("{shader:?}: {e}"));
+        // Samples of depths are what WebGL2 cannot read.
+        if shader == Shader::Resolve {
+            continue;
+        }
         for (stage, entry) in [(ShaderStage::Vertex, "screen_vertex"), (ShaderStage::Fragment, entry)] {
             translate_to_webgl2(&module, stage, entry).unwrap_or_else(|e| panic!("{shader:?}: {e}"));
         }
@@ -56,14 +63,18 @@ fn uniforms_are_laid_out_as_in_the_shaders() {
     check(Shader::Minify, "MinifyParams", size_of::<MinifyUniform>(), &members);
     let members = members!(ReconstructUniform: axis taps stride sharpness pad_a pad_b);
     check(Shader::Reconstruct, "ReconstructParams", size_of::<ReconstructUniform>(), &members);
-    let members = members!(HbaoUniform: radius_m directions steps bias strength is_mean pad);
+    let members = members!(HbaoUniform: radius_m directions steps bias strength is_mean
+        hidden_layers looks compensation pad_a pad_b);
     check(Shader::Hbao, "HbaoParams", size_of::<HbaoUniform>(), &members);
     let members = members!(GtaoUniform: radius_m slices steps thickness_m bias pad_a pad_b);
     check(Shader::Gtao, "GtaoParams", size_of::<GtaoUniform>(), &members);
-    let members = members!(SsaoUniform: radius_m samples height_m pad offsets turns);
+    let members = members!(SsaoUniform: radius_m samples height_m hidden_layers compensation pad_a pad_b
+        offsets turns);
     check(Shader::Ssao, "SsaoParams", size_of::<SsaoUniform>(), &members);
     let members = members!(BlurUniform: axis half_width inverse_sigma middle pad_a pad_b);
     check(Shader::SsaoBlur, "BlurParams", size_of::<BlurUniform>(), &members);
+    let members = members!(ResolveUniform: full_size is_half pad);
+    check(Shader::Resolve, "ResolveParams", size_of::<ResolveUniform>(), &members);
     let members = members!(HalveUniform: full_size pad);
     check(Shader::Halve, "HalveParams", size_of::<HalveUniform>(), &members);
     let members = members!(PlaceUniform: guard is_half pad);
@@ -101,16 +112,38 @@ impl Bench {
     }
 }
 
+impl Bench {
+    /// The stochastic map that the last picture was made with, if one was.
+    fn map(&self, view: &ScreenView) -> Option<StochasticMap> {
+        let ScreenMethod::Stochastic(_, StochasticParams { map, .. }) = view.method else { return None };
+        let texture = self.passes.hidden().unwrap();
+        let (columns, pixels) = (texture.width(), (texture.width() * texture.height()) as usize);
+        let mut distances_m = vec![f32::INFINITY; pixels * map.samples as usize];
+        for layer in 0..map.samples.div_ceil(4) {
+            let bytes = block_on(read_texture(&self.gpu, texture, layer)).unwrap();
+            for (pixel, texel) in bytes.chunks_exact(16).enumerate() {
+                for i in 0..4u32.min(map.samples - 4 * layer) {
+                    let at = 4 * i as usize;
+                    let distance = f32::from_le_bytes([0, 1, 2, 3].map(|byte| texel[at + byte]));
+                    let place = pixel * map.samples as usize + (4 * layer + i) as usize;
+                    distances_m[place] = if distance < 1e29 { distance } else { f32::INFINITY };
+                }
+            }
+        }
+        Some(StochasticMap::of_distances(columns, map.samples, distances_m).unwrap())
+    }
+}
+
 /// The same by the twins, and the distances of the picture.
-fn twin(stage: &Stage, view: &ScreenView) -> (Vec<f32>, Vec<f32>) {
+fn twin(stage: &Stage, view: &ScreenView, map: Option<&StochasticMap>) -> (Vec<f32>, Vec<f32>) {
     let size = [view.size.0, view.size.1];
     let wide = view.guard.rasterize(&stage.scene, &stage.pose, &view.camera, size, 1).unwrap();
     let camera = view.guard.camera(&view.camera, size[1]);
     let screen = wide.screen(&stage.scene, &stage.pose, &camera).unwrap();
     let values = if view.half_resolution {
-        at_half_resolution(&screen, |half| view.method.estimate_visibility(half)).unwrap()
+        at_half_resolution(&screen, |half| view.method.estimate_visibility(half, map)).unwrap()
     } else {
-        view.method.estimate_visibility(&screen).unwrap()
+        view.method.estimate_visibility(&screen, map).unwrap()
     };
     let crop = |values: &[f32]| view.guard.crop(values, size, 1).unwrap();
     (crop(&values), crop(screen.distances_m()))
@@ -145,7 +178,22 @@ fn methods() -> Vec<ScreenMethod> {
             ..SaoParams::default()
         })
     });
-    ScreenKind::ALL.map(ScreenKind::method).into_iter().chain(filters).collect()
+    ScreenKind::ALL.map(ScreenKind::method).into_iter().chain(filters).chain(stochastic()).collect()
+}
+
+/// Maps that take several drawings, or less than one, and all ways to look.
+fn stochastic() -> Vec<ScreenMethod> {
+    let hbao = Layered::Hbao(HbaoParams::hbao());
+    let plus = Layered::Hbao(HbaoParams::hbao_plus());
+    let usual = StochasticParams::default();
+    let with = |samples| StochasticParams { map: MapParams::with_samples(samples), ..usual };
+    let paper =
+        StochasticParams { map: MapParams::paper(8), looks: Looks::WhereFirstIsFar, compensation: 2.0 };
+    let alone = MapParams { picks: Picks::Independent, ..MapParams::with_samples(4) };
+    let everywhere = StochasticParams { map: alone, looks: Looks::Everywhere, ..usual };
+    [(plus, with(16)), (hbao, with(1)), (plus, paper), (hbao, paper), (plus, everywhere), (hbao, everywhere)]
+        .map(|(layered, params)| ScreenMethod::Stochastic(layered, params))
+        .to_vec()
 }
 
 #[test]
@@ -161,8 +209,9 @@ fn card_and_twin_agree() {
             cases.flat_map(|case| methods().into_iter().map(move |method| (case, method)))
         {
             let view = ScreenView { camera, size, method, guard, half_resolution };
-            let (twin, distances_m) = twin(&stage, &view);
             let card = bench.run(&view);
+            let map = bench.map(&view);
+            let (twin, distances_m) = twin(&stage, &view, map.as_ref());
             let (mut seen, mut within, mut sum) = (0, 0, 0.0);
             for ((twin, card), distance) in twin.iter().zip(&card).zip(&distances_m) {
                 // An edge may fall to the other side.
@@ -183,6 +232,42 @@ fn card_and_twin_agree() {
             eprintln!("{case}: {part:.4} within, mean {mean:.5}");
             assert!(seen > size.0 * size.1 * 99 / 100, "{method:?}: {seen}");
             assert!(part > 0.993 && mean < 0.001, "{case}, {method:?}: {part}, {mean}");
+        }
+    }
+}
+
+/// Samples that hold the same surface, of those that hold any: a card has other last bits of depths, and other silhouettes.
+#[test]
+fn maps_hold_what_the_twins_do() {
+    let stage = still_life();
+    let Some(mut bench) = Bench::new(&stage) else { return };
+    for camera in cameras() {
+        for samples in [1, 2, 4, 8, 16] {
+            for map_params in [MapParams::with_samples(samples), MapParams::paper(samples)] {
+                let stochastic = StochasticParams { map: map_params, ..StochasticParams::default() };
+                let method = ScreenMethod::Stochastic(Layered::Hbao(HbaoParams::hbao_plus()), stochastic);
+                let (size, guard) = ((160, 120), GuardBand::default());
+                let view = ScreenView { camera, size, method, guard, half_resolution: false };
+                bench.run(&view);
+                let card = bench.map(&view).unwrap();
+                let gbuffer = rasterize(&stage.scene, &stage.pose, &camera, size.0, size.1, 1).unwrap();
+                let twin =
+                    StochasticMap::draw(&stage.scene, &stage.pose, &camera, &gbuffer, &map_params).unwrap();
+                let (mut held, mut same, mut counts) = (0, 0, [0, 0]);
+                for i in 0..(size.0 * size.1) as usize {
+                    for (a, b) in card.distances_m(i).iter().zip(twin.distances_m(i)) {
+                        counts[0] += usize::from(a.is_finite());
+                        counts[1] += usize::from(b.is_finite());
+                        held += usize::from(a.is_finite() || b.is_finite());
+                        same += usize::from((a - b).abs() < 1e-3 * b.abs());
+                    }
+                }
+                let part = same as f64 / held as f64;
+                eprintln!("{samples} {:?}: {counts:?}, {part:.3} alike", map_params.is_first_left_out);
+                assert!(held > 1000, "{held}");
+                assert!(counts[0].abs_diff(counts[1]) * 50 < counts[1], "{counts:?}");
+                assert!(part > 0.9, "{samples}: {part}");
+            }
         }
     }
 }

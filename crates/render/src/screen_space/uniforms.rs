@@ -120,7 +120,11 @@ pub(super) struct HbaoUniform {
     pub(super) bias: f32,
     pub(super) strength: f32,
     pub(super) is_mean: u32,
-    pub(super) pad: [f32; 2],
+    pub(super) hidden_layers: u32,
+    pub(super) looks: u32,
+    pub(super) compensation: f32,
+    pub(super) pad_a: f32,
+    pub(super) pad_b: [f32; 2],
 }
 
 /// `GtaoParams` in `gtao.wgsl`.
@@ -143,7 +147,10 @@ pub(super) struct SsaoUniform {
     pub(super) radius_m: f32,
     pub(super) samples: u32,
     pub(super) height_m: f32,
-    pub(super) pad: f32,
+    pub(super) hidden_layers: u32,
+    pub(super) compensation: f32,
+    pub(super) pad_a: f32,
+    pub(super) pad_b: [f32; 2],
     pub(super) offsets: [[f32; 4]; 256],
     pub(super) turns: [[f32; 4]; 128],
 }
@@ -158,6 +165,15 @@ pub(super) struct BlurUniform {
     pub(super) middle: f32,
     pub(super) pad_a: f32,
     pub(super) pad_b: [f32; 2],
+}
+
+/// `ResolveParams` in `resolve.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct ResolveUniform {
+    pub(super) full_size: [i32; 2],
+    pub(super) is_half: u32,
+    pub(super) pad: u32,
 }
 
 /// `PlaceParams` in `place.wgsl`.

@@ -163,6 +163,23 @@ impl StochasticMap {
         StochasticMap { columns, rows, samples, distances_m: depths }
     }
 
+    /// A map that was made elsewhere: distances along the view axis, metres, `samples` (1, 2, 4, 8 or 16) for each sample of a picture with so many columns, infinite
+    /// where none is.
+    ///
+    /// # Errors
+    /// A list that fills no whole number of rows.
+    pub fn of_distances(
+        columns: u32,
+        samples: u32,
+        distances_m: Vec<f32>,
+    ) -> Result<StochasticMap, RenderError> {
+        MapParams { samples, ..MapParams::default() }.check()?;
+        let row = (columns as usize).saturating_mul(samples as usize);
+        let rows = distances_m.len().checked_div(row).unwrap_or(0);
+        RenderError::check_length("distances of a stochastic map", distances_m.len(), row * rows)?;
+        Ok(StochasticMap { columns, rows: rows as u32, samples, distances_m })
+    }
+
     /// Of the samples of [`Screen::half`](crate::gbuffer::Screen::half) alone.
     pub fn half(&self) -> StochasticMap {
         let sources = half_sources(self.columns, self.rows);

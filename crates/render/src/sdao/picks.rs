@@ -62,6 +62,28 @@ pub(super) struct Chooser {
     seed: u32,
 }
 
+/// What a card chooses by.
+#[cfg(feature = "gpu")]
+pub(crate) struct ChoiceTable {
+    /// α in 2⁻²⁴.
+    pub(crate) alpha: u32,
+    /// ⌊α S⌋, and what is left, in 2⁻²⁴.
+    pub(crate) whole: u32,
+    pub(crate) part: u32,
+    /// Of each size of sets the first in `masks`; one more at the end.
+    pub(crate) starts: Vec<u32>,
+    pub(crate) masks: Vec<u16>,
+}
+
+#[cfg(feature = "gpu")]
+impl ChoiceTable {
+    pub(crate) fn new(params: &super::MapParams) -> ChoiceTable {
+        let Chooser { alpha, whole, part, subsets, .. } =
+            Chooser::new(params.picks, params.samples, params.alpha, params.seed);
+        ChoiceTable { alpha, whole, part, starts: subsets.starts, masks: subsets.masks }
+    }
+}
+
 impl Chooser {
     /// `samples` is 1 … 16, `alpha` 0 … 1.
     pub(super) fn new(picks: Picks, samples: u32, alpha: f32, seed: u32) -> Chooser {

@@ -5,7 +5,11 @@ struct SsaoParams {
     samples: u32,
     // Metres over the surface's plane.
     height_m: f32,
-    pad: f32,
+    // Layers of `hidden` that are read, and what occlusion by them is multiplied by.
+    hidden_layers: u32,
+    compensation: f32,
+    pad_a: f32,
+    pad_b: vec2<f32>,
     // In the unit hemisphere about +z; w is not used.
     offsets: array<vec4<f32>, 256>,
     // Tile of 16 × 16 unit vectors in the plane z = 0, two a texel.
@@ -38,6 +42,14 @@ fn tangent_of(normal: vec3<f32>, turn: vec3<f32>) -> vec3<f32> {
     return vec3(normal.x * normal.y * a, sign + normal.y * normal.y * a, -normal.y);
 }
 
+// Whether what is seen hides a place of the hemisphere about a position.
+fn is_blocked(seen: vec3<f32>, place: vec3<f32>, position: vec3<f32>, normal: vec3<f32>) -> bool {
+    let to_seen = seen - position;
+    let is_within = dot(to_seen, to_seen) <= params.radius_m * params.radius_m;
+    // What hides a place of the hemisphere from an eye above the plane is above it, too: only rounding to samples says else.
+    return seen.z > place.z && is_within && dot(normal, to_seen) > params.height_m;
+}
+
 @fragment
 fn ssao_fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
     let at = vec2<i32>(position.xy);
@@ -59,12 +71,25 @@ fn ssao_fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f3
     for (var i = 0u; i < params.samples; i++) {
         let offset = params.offsets[i].xyz * params.radius_m;
         let place = found.xyz + (tangent * offset.x + bitangent * offset.y + normal * offset.z);
-        let seen = place_at(sample_at(place));
-        let to_seen = seen.xyz - found.xyz;
-        let is_within = dot(to_seen, to_seen) <= params.radius_m * params.radius_m;
-        // What hides a place of the hemisphere from an eye above the plane is above it, too: only rounding to samples says else.
-        let is_above = dot(normal, to_seen) > params.height_m;
-        blocked += select(0.0, 1.0, seen.w > 0.0 && seen.z > place.z && is_within && is_above);
+        let at_place = sample_at(place);
+        if !is_inside(at_place) {
+            continue;
+        }
+        let seen = place_at(at_place);
+        if seen.w > 0.0 && is_blocked(seen.xyz, place, found.xyz, normal) {
+            blocked += 1.0;
+            continue;
+        }
+        // Where the first surface blocks, others change nothing.
+        var is_hidden = false;
+        for (var layer = 0u; layer < params.hidden_layers && !is_hidden; layer++) {
+            let four = textureLoad(hidden, at_place, i32(layer), 0);
+            for (var k = 0; k < 4; k++) {
+                let behind = place_view(centre(at_place), four[k]);
+                is_hidden = is_hidden || (!is_background(four[k]) && is_blocked(behind, place, found.xyz, normal));
+            }
+        }
+        blocked += select(0.0, params.compensation, is_hidden);
     }
     return vec4(blocked / f32(params.samples));
 }
