@@ -243,7 +243,7 @@ impl<'a> Estimator<'a> {
                 Looks::WhereFirstIsFar => self.weight(first).is_some() || is_under(first),
                 Looks::WhereFirstRises => is_under(first),
             });
-            let hidden = if is_decided {
+            let hidden = if is_decided || self.lookup.is_empty() {
                 None
             } else {
                 let gains = self.to_hidden(centre, index).filter_map(gain);
@@ -267,6 +267,9 @@ impl<'a> Estimator<'a> {
         };
         let first = self.to_first(centre, index);
         let seen = first.and_then(height);
+        if self.lookup.is_empty() {
+            return seen.unwrap_or(0.0);
+        }
         let is_decided = first.is_some_and(|first| match self.lookup.looks {
             Looks::Everywhere => false,
             Looks::WhereFirstIsFar => seen.is_some(),

@@ -82,6 +82,11 @@ impl<'a> Lookup<'a> {
         RenderError::check_length("a column of hidden surfaces", rows as usize, own[1] as usize)
     }
 
+    /// Whether nothing hidden is known.
+    pub(crate) fn is_empty(&self) -> bool {
+        matches!(self.hidden, Hidden::Nothing)
+    }
+
     /// Places of the known hidden surfaces under a sample, in view space; the first surface's may be among them.
     pub(crate) fn places<'b>(
         &self,
