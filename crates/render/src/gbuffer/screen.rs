@@ -106,12 +106,7 @@ impl Screen {
 
     /// The place that a sample sees, at the sample's centre; `None` for the background and for an index that is out of range.
     pub fn position_view(&self, sample_index: usize) -> Option<Vec3> {
-        let distance = *self.distances_m.get(sample_index)?;
-        if !distance.is_finite() {
-            return None;
-        }
-        let (column, row) = (sample_index % self.columns as usize, sample_index / self.columns as usize);
-        Some(self.place_view(column as f32 + 0.5, row as f32 + 0.5, distance))
+        self.position_at([sample_index % self.columns as usize, sample_index / self.columns as usize])
     }
 
     /// The place at a distance that a point of the picture shows. Coordinates count samples: the first one's centre is at (0.5, 0.5).
@@ -162,7 +157,8 @@ impl Screen {
 
     /// The place that the sample in a column and row sees; `None` for the background.
     pub fn position_at(&self, [column, row]: [usize; 2]) -> Option<Vec3> {
-        self.position_view(row * self.columns as usize + column)
+        let distance = *self.distances_m.get(row * self.columns as usize + column)?;
+        distance.is_finite().then(|| self.place_view(column as f32 + 0.5, row as f32 + 0.5, distance))
     }
 
     /// The way from a place to the eye, a unit vector.

@@ -91,15 +91,15 @@ impl<'a> Lookup<'a> {
     pub(crate) fn places<'b>(
         &self,
         screen: &'b Screen,
-        index: usize,
+        [column, row]: [usize; 2],
     ) -> impl Iterator<Item = Vec3> + use<'a, 'b> {
+        let index = row * screen.columns() as usize + column;
         let distances: &'a [f32] = match self.hidden {
             Hidden::Nothing => &[],
             Hidden::Stochastic(map) => map.distances_m(index),
             Hidden::Peeled(layers) => layers.distances_m(index),
         };
-        let columns = screen.columns() as usize;
-        let (column, row) = ((index % columns) as f32 + 0.5, (index / columns) as f32 + 0.5);
+        let (column, row) = (column as f32 + 0.5, row as f32 + 0.5);
         let kept = distances.iter().filter(|distance| distance.is_finite());
         kept.map(move |distance| screen.place_view(column, row, *distance))
     }
