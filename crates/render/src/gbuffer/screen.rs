@@ -111,11 +111,20 @@ impl Screen {
 
     /// The place at a distance that a point of the picture shows. Coordinates count samples: the first one's centre is at (0.5, 0.5).
     pub fn place_view(&self, column: f32, row: f32, distance_m: f32) -> Vec3 {
+        self.places_view(column, row)(distance_m)
+    }
+
+    /// [`Screen::place_view`] of a point of the picture, by distance: for several places that it shows.
+    pub(crate) fn places_view(&self, column: f32, row: f32) -> impl Fn(f32) -> Vec3 + use<> {
         let x = 2.0 * column / self.columns as f32 - 1.0;
         let y = 1.0 - 2.0 * row / self.rows as f32;
-        let scale = if self.lens.is_perspective { distance_m } else { 1.0 };
+        let is_perspective = self.lens.is_perspective;
         let [half_width, half_height] = self.lens.half_extent;
-        Vec3::new(x * half_width * scale, y * half_height * scale, -distance_m)
+        let (across, up) = (x * half_width, y * half_height);
+        move |distance_m| {
+            let scale = if is_perspective { distance_m } else { 1.0 };
+            Vec3::new(across * scale, up * scale, -distance_m)
+        }
     }
 
     /// Where what a point of the picture shows meets the plane through a place with a normal; `None` if it does not, or behind the camera. Coordinates as of

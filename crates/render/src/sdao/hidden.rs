@@ -88,19 +88,19 @@ impl<'a> Lookup<'a> {
     }
 
     /// Places of the known hidden surfaces under a sample, in view space; the first surface's may be among them.
-    pub(crate) fn places<'b>(
+    pub(crate) fn places(
         &self,
-        screen: &'b Screen,
+        screen: &Screen,
         [column, row]: [usize; 2],
-    ) -> impl Iterator<Item = Vec3> + use<'a, 'b> {
+    ) -> impl Iterator<Item = Vec3> + use<'a> {
         let index = row * screen.columns() as usize + column;
         let distances: &'a [f32] = match self.hidden {
             Hidden::Nothing => &[],
             Hidden::Stochastic(map) => map.distances_m(index),
             Hidden::Peeled(layers) => layers.distances_m(index),
         };
-        let (column, row) = (column as f32 + 0.5, row as f32 + 0.5);
-        let kept = distances.iter().filter(|distance| distance.is_finite());
-        kept.map(move |distance| screen.place_view(column, row, *distance))
+        let kept = distances.iter().copied().filter(|distance| distance.is_finite());
+        let place = screen.places_view(column as f32 + 0.5, row as f32 + 0.5);
+        kept.map(place)
     }
 }
