@@ -123,13 +123,7 @@ impl Screen {
 
     /// The place that a sample sees, at the sample's centre; `None` for the background and for an index that is out of range.
     pub fn position_view(&self, sample_index: usize) -> Option<Vec3> {
-        let distance = *self.distances_m.get(sample_index)?;
-        if !distance.is_finite() {
-            return None;
-        }
-        let [column, row] =
-            self.centre([sample_index % self.columns as usize, sample_index / self.columns as usize]);
-        Some(self.place_view(column, row, distance))
+        self.position_at([sample_index % self.columns as usize, sample_index / self.columns as usize])
     }
 
     /// The point of the picture that the sample in a column and row is of, as of [`Screen::place_view`]: the middle of its square, but not in a
@@ -143,11 +137,20 @@ impl Screen {
 
     /// The place at a distance that a point of the picture shows. Coordinates count samples: the first one's centre is at (0.5, 0.5).
     pub fn place_view(&self, column: f32, row: f32, distance_m: f32) -> Vec3 {
+        self.places_view(column, row)(distance_m)
+    }
+
+    /// [`Screen::place_view`] of a point of the picture, by distance: for several places that it shows.
+    pub(crate) fn places_view(&self, column: f32, row: f32) -> impl Fn(f32) -> Vec3 + use<> {
         let x = 2.0 * column / self.span[0] - 1.0;
         let y = 1.0 - 2.0 * row / self.span[1];
-        let scale = if self.lens.is_perspective { distance_m } else { 1.0 };
+        let is_perspective = self.lens.is_perspective;
         let [half_width, half_height] = self.lens.half_extent;
-        Vec3::new(x * half_width * scale, y * half_height * scale, -distance_m)
+        let (across, up) = (x * half_width, y * half_height);
+        move |distance_m| {
+            let scale = if is_perspective { distance_m } else { 1.0 };
+            Vec3::new(across * scale, up * scale, -distance_m)
+        }
     }
 
     /// Where what a point of the picture shows meets the plane through a place with a normal; `None` if it does not, or behind the camera. Coordinates as of
@@ -209,7 +212,11 @@ impl Screen {
 
     /// The place that the sample in a column and row sees; `None` for the background.
     pub fn position_at(&self, [column, row]: [usize; 2]) -> Option<Vec3> {
-        self.position_view(row * self.columns as usize + column)
+        let distance = *self.distances_m.get(row * self.columns as usize + column)?;
+        distance.is_finite().then(|| {
+            let [column, row] = self.centre([column, row]);
+            self.place_view(column, row, distance)
+        })
     }
 
     /// The way from a place to the eye, a unit vector.

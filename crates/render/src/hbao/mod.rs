@@ -201,32 +201,29 @@ impl<'a> Estimator<'a> {
     pub(crate) fn along(&self, centre: &Centre, [cos, sin]: [f32; 2]) -> f32 {
         let radius = self.params.radius_m * self.screen.samples_per_metre(-centre.place.z);
         let step = radius / (self.params.steps + 1) as f32;
-        let columns = self.screen.columns() as usize;
         let steps = (0..self.params.steps).filter_map(|i| {
             let length = step * (i as f32 + 0.5 + centre.jitter);
             let point = [centre.point[0] + length * cos, centre.point[1] + length * sin];
-            self.screen.sample_in(point).map(|[column, row]| row * columns + column)
+            self.screen.sample_in(point)
         });
         match self.params.horizon {
             Horizon::Highest => {
                 let tangent = self.tangent(centre, [cos, sin]).unwrap_or(Vec3::NEG_Z);
                 self.under_horizon(centre, tangent, steps)
             }
-            Horizon::Mean => {
-                steps.map(|index| self.height(centre, index)).sum::<f32>() / self.params.steps as f32
-            }
+            Horizon::Mean => steps.map(|at| self.height(centre, at)).sum::<f32>() / self.params.steps as f32,
         }
     }
 
     /// The way to the first surface of a sample.
-    fn to_first(&self, centre: &Centre, index: usize) -> Option<Vec3> {
-        Some(self.screen.position_view(index)? - centre.place)
+    fn to_first(&self, centre: &Centre, at: [usize; 2]) -> Option<Vec3> {
+        Some(self.screen.position_at(at)? - centre.place)
     }
 
     /// The ways to hidden ones.
-    fn to_hidden(&self, centre: &Centre, index: usize) -> impl Iterator<Item = Vec3> {
+    fn to_hidden(&self, centre: &Centre, at: [usize; 2]) -> impl Iterator<Item = Vec3> {
         let place = centre.place;
-        self.lookup.places(self.screen, index).map(move |hidden| hidden - place)
+        self.lookup.places(self.screen, at).map(move |hidden| hidden - place)
     }
 
     /// How much what is so far away counts; `None` beyond the radius.
@@ -238,11 +235,11 @@ impl<'a> Estimator<'a> {
 
     /// Alg. 2, lines 8 to 35: how much of the rays over the surface in a direction is under the highest place, each stretch weighted by how far what raised the
     /// horizon is.
-    fn under_horizon(&self, centre: &Centre, tangent: Vec3, steps: impl Iterator<Item = usize>) -> f32 {
+    fn under_horizon(&self, centre: &Centre, tangent: Vec3, steps: impl Iterator<Item = [usize; 2]>) -> f32 {
         let tangent = libm::asinf((tangent.z / tangent.length().max(1e-12)).clamp(-1.0, 1.0));
         let mut sine = libm::sinf((tangent + self.bias).min(std::f32::consts::FRAC_PI_2));
         let mut sum = 0.0;
-        for index in steps {
+        for at in steps {
             // By how much what is seen raises the sum, and to where the horizon.
             let gain = |to_seen: Vec3| {
                 let weight = self.weight(to_seen)?;
@@ -251,7 +248,7 @@ impl<'a> Estimator<'a> {
                 let is_above = centre.normal.dot(to_seen) > self.sin_bias * length;
                 (is_above && found > sine).then_some((weight * (found - sine), found))
             };
-            let first = self.to_first(centre, index);
+            let first = self.to_first(centre, at);
             let seen = first.and_then(gain);
             let is_under = |first: Vec3| first.z <= sine * first.length();
             let is_decided = first.is_some_and(|first| match self.lookup.looks {
@@ -259,10 +256,10 @@ impl<'a> Estimator<'a> {
                 Looks::WhereFirstIsFar => self.weight(first).is_some() || is_under(first),
                 Looks::WhereFirstRises => is_under(first),
             });
-            let hidden = if is_decided {
+            let hidden = if is_decided || self.lookup.is_empty() {
                 None
             } else {
-                let gains = self.to_hidden(centre, index).filter_map(gain);
+                let gains = self.to_hidden(centre, at).filter_map(gain);
                 gains.reduce(|best, other| if other.0 > best.0 { other } else { best })
             };
             let hidden = hidden.filter(|(more, _)| seen.is_none_or(|seen| *more > seen.0));
@@ -276,30 +273,42 @@ impl<'a> Estimator<'a> {
     }
 
     /// Alg. 3, lines 18 to 24: the greatest height over the surface, as a sine over a bias, by weight, of all that is known under a sample.
-    fn height(&self, centre: &Centre, index: usize) -> f32 {
-        let height = |to_seen: Vec3| {
-            let weight = self.weight(to_seen)?;
-            Some(weight * (centre.normal.dot(to_seen) / to_seen.length() - self.sin_bias).max(0.0))
-        };
-        let first = self.to_first(centre, index);
+    fn height(&self, centre: &Centre, at: [usize; 2]) -> f32 {
+        let first = self.to_first(centre, at);
         // Its own sample blocks nothing, and a card draws it twice with other last bits.
         if first == Some(Vec3::ZERO) {
             return 0.0;
         }
-        let seen = first.and_then(height);
-        let is_decided = first.is_some_and(|first| match self.lookup.looks {
+        let seen = first.and_then(|first| self.height_of(centre, first));
+        if self.lookup.is_empty() || first.is_some_and(|first| self.is_decided(centre, first)) {
+            return seen.unwrap_or(0.0);
+        }
+        seen.unwrap_or(0.0).max(self.lookup.compensation * self.hidden_height(centre, at))
+    }
+
+    /// Of one surface (line 23); `None` beyond the radius.
+    fn height_of(&self, centre: &Centre, to_seen: Vec3) -> Option<f32> {
+        let weight = self.weight(to_seen)?;
+        Some(weight * (centre.normal.dot(to_seen) / to_seen.length() - self.sin_bias).max(0.0))
+    }
+
+    /// Whether the first surface is all that matters.
+    fn is_decided(&self, centre: &Centre, first: Vec3) -> bool {
+        match self.lookup.looks {
             Looks::Everywhere => false,
-            Looks::WhereFirstIsFar => seen.is_some(),
+            Looks::WhereFirstIsFar => self.weight(first).is_some(),
             // Rays that come from below the plane may still rise over it.
             Looks::WhereFirstRises => {
                 centre.normal.dot(first) <= self.sin_bias * first.length()
                     && self.screen.falls_on(centre.place + first, centre.normal)
             }
-        });
-        if is_decided {
-            return seen.unwrap_or(0.0);
         }
-        let hidden = self.to_hidden(centre, index).filter_map(height).fold(0.0, f32::max);
-        seen.unwrap_or(0.0).max(self.lookup.compensation * hidden)
+    }
+
+    /// The greatest of hidden surfaces. Apart, so that what is always done stays small.
+    #[inline(never)]
+    fn hidden_height(&self, centre: &Centre, at: [usize; 2]) -> f32 {
+        let heights = self.to_hidden(centre, at).filter_map(|hidden| self.height_of(centre, hidden));
+        heights.fold(0.0, f32::max)
     }
 }

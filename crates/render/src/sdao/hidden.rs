@@ -82,20 +82,26 @@ impl<'a> Lookup<'a> {
         RenderError::check_length("a column of hidden surfaces", rows as usize, own[1] as usize)
     }
 
+    /// Whether nothing hidden is known.
+    pub(crate) fn is_empty(&self) -> bool {
+        matches!(self.hidden, Hidden::Nothing)
+    }
+
     /// Places of the known hidden surfaces under a sample, in view space; the first surface's may be among them.
-    pub(crate) fn places<'b>(
+    pub(crate) fn places(
         &self,
-        screen: &'b Screen,
-        index: usize,
-    ) -> impl Iterator<Item = Vec3> + use<'a, 'b> {
+        screen: &Screen,
+        [column, row]: [usize; 2],
+    ) -> impl Iterator<Item = Vec3> + use<'a> {
+        let index = row * screen.columns() as usize + column;
         let distances: &'a [f32] = match self.hidden {
             Hidden::Nothing => &[],
             Hidden::Stochastic(map) => map.distances_m(index),
             Hidden::Peeled(layers) => layers.distances_m(index),
         };
-        let columns = screen.columns() as usize;
-        let [column, row] = screen.centre([index % columns, index / columns]);
-        let kept = distances.iter().filter(|distance| distance.is_finite());
-        kept.map(move |distance| screen.place_view(column, row, *distance))
+        let kept = distances.iter().copied().filter(|distance| distance.is_finite());
+        let [x, y] = screen.centre([column, row]);
+        let place = screen.places_view(x, y);
+        kept.map(place)
     }
 }

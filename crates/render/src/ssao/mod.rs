@@ -153,9 +153,9 @@ fn occlusion_at(
             // What hides a place of the hemisphere from an eye above the plane is above it, too: only rounding to samples says else.
             is_nearer && is_within && normal.dot(to_seen) > height
         };
-        let Some(other) = screen.sample_at(place) else { continue };
+        let Some(other) = screen.point_of(place).and_then(|point| screen.sample_in(point)) else { continue };
         // Where the first surface blocks, others change nothing: whether they are looked at there (sec. 3.3) is a matter of time alone.
-        if screen.position_view(other).is_some_and(is_blocked_by) {
+        if screen.position_at(other).is_some_and(is_blocked_by) {
             seen += 1;
         } else if lookup.places(screen, other).any(is_blocked_by) {
             hidden += 1;

@@ -203,7 +203,6 @@ fn a_hidden_occluder_in_pictures() {
     let (_, hbao) = METHODS[1];
     let pictures = [
         ("hidden-box-hbao", hbao(&screen, &Lookup::default())),
-        ("hidden-box-sd-hbao-1", estimate(hbao, 1)(&shot)),
         ("hidden-box-sd-hbao", estimate(hbao, 4)(&shot)),
     ];
     for (name, visibility) in pictures {
