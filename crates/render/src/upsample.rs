@@ -51,7 +51,7 @@ fn value_at(full: &Screen, half: &Screen, values: &[f32], at: [usize; 2]) -> f32
         (0..9).filter_map(|i| {
             let (column, row) = ((at[0] / 2 + i % 3).wrapping_sub(1), (at[1] / 2 + i / 3).wrapping_sub(1));
             let inside = column < half.columns() as usize && row < half.rows() as usize;
-            inside.then_some(([column, row], row * half.columns() as usize + column))
+            inside.then(|| ([column, row], row * half.columns() as usize + column))
         })
     };
     let (mut sum, mut weights) = (0.0, 0.0);

@@ -137,7 +137,11 @@ fn thin_things_darken_like_thick_ones() {
     let [_, _, _, hbao, _, gtao] = found;
     assert!(hbao < 0.9, "all under the horizon is taken for solid: {found:?}");
     assert!(gtao < 0.92, "as thick as half of the radius: {found:?}");
-    check_golden("sao", "failure-thin", &pair([(&seen, of("sao")), (&seen, of("hbao"))]));
+    let mut picture = pair([(&seen, of("sao")), (&seen, of("hbao"))]);
+    // Rows in the middle: there is nothing in the others.
+    picture.pixels = picture.pixels[24 * picture.width as usize..][..48 * picture.width as usize].to_vec();
+    picture.height = 48;
+    check_golden("sao", "failure-thin", &picture);
 }
 
 /// A beam passes before a wall and hides it, not the ground at its foot: what the wall blocked comes back.
