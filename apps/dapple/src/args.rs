@@ -3,6 +3,7 @@
 pub(crate) mod bake;
 mod bench;
 mod bit_rate;
+mod effort;
 mod eval;
 mod serve;
 mod verbs;
@@ -16,11 +17,12 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
 
-use crate::screen_space::{Effort, Layered, ScreenSpace, Stochastic};
+use crate::screen_space::{Layered, ScreenSpace, Stochastic};
 
 pub(crate) use bake::BakeArgs;
 pub(crate) use bench::{Bench, BenchArgs, JoinArgs, ServedArgs, SoakArgs, ViewersArgs};
 pub(crate) use bit_rate::BitRate;
+pub(crate) use effort::EffortArgs;
 pub(crate) use eval::{EvalArgs, Options, ScenesArgs};
 pub(crate) use serve::{LogFormat, Named, ServeArgs};
 pub(crate) use verbs::{CompareArgs, DiffArgs, ErrorMap, EvalVerb, JudgeArgs, PictureFormat, ReferenceArgs};
@@ -137,26 +139,6 @@ pub(crate) struct VisibilityArgs {
     /// In pictures of `eval` and `render`; windows and pages do not use them yet.
     #[arg(long)]
     pub(crate) bent_normals: bool,
-}
-
-/// How screen-space methods run.
-#[derive(Debug, Clone, Copy, PartialEq, Args)]
-pub(crate) struct EffortArgs {
-    /// Work of the screen-space methods: low, medium (both at half resolution), high (their defaults) or ultra.
-    #[arg(long, value_name = "PRESET", default_value = "high")]
-    pub(crate) ao_preset: dapple_render::Preset,
-    /// Screen-space methods look at a quarter of the samples, and the rest is filled in along surfaces [default: the preset's].
-    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL")]
-    pub(crate) half_resolution: Option<bool>,
-    /// How far screen-space methods see beyond the picture, as a part of its height, 0 to 0.5.
-    #[arg(long, value_name = "PART", default_value_t = Effort::GUARD_BAND)]
-    pub(crate) guard_band: f32,
-}
-
-impl EffortArgs {
-    pub(crate) fn effort(self) -> Effort {
-        Effort { preset: self.ao_preset, half_resolution: self.half_resolution, guard_band: self.guard_band }
-    }
 }
 
 /// What a server spends: on each of its steps, and on what it sends.

@@ -76,7 +76,9 @@ impl Preset {
     pub fn sao(self) -> Chosen<SaoParams> {
         let (samples, turns) = self.of([(6, 5), (9, 7), (9, 7), (18, 7)]);
         let (blur_taps, blur_stride) = self.of([(2, 2), (3, 2), (3, 3), (3, 3)]);
-        self.chosen(SaoParams { samples, turns, blur_taps, blur_stride, ..SaoParams::default() })
+        // Neighbours of a half lie twice as far apart in depth, too.
+        let sharpness = self.of([1024.0, 1024.0, 2048.0, 2048.0]);
+        self.chosen(SaoParams { samples, turns, blur_taps, blur_stride, sharpness, ..SaoParams::default() })
     }
 
     /// Of HBAO.

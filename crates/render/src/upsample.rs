@@ -46,28 +46,42 @@ fn value_at(full: &Screen, half: &Screen, values: &[f32], at: [usize; 2]) -> f32
     let normal = full.normals_view()[at[1] * full.columns() as usize + at[0]];
     let centre = full.centre(at);
     let tolerance_m = TOLERANCE_SAMPLES / full.samples_per_metre(-place.z);
+    // Column, row and index of those of the half around it.
+    let around = || {
+        (0..9).filter_map(|i| {
+            let (column, row) = ((at[0] / 2 + i % 3).wrapping_sub(1), (at[1] / 2 + i / 3).wrapping_sub(1));
+            let inside = column < half.columns() as usize && row < half.rows() as usize;
+            inside.then(|| ([column, row], row * half.columns() as usize + column))
+        })
+    };
     let (mut sum, mut weights) = (0.0, 0.0);
-    let (mut nearest_m, mut nearest) = (f32::INFINITY, 1.0);
-    for i in 0..9 {
-        let (column, row) = ((at[0] / 2 + i % 3).wrapping_sub(1), (at[1] / 2 + i / 3).wrapping_sub(1));
-        if column >= half.columns() as usize || row >= half.rows() as usize {
+    for (cell, index) in around() {
+        let by = half.centre(cell);
+        let near = |axis: usize| (1.0 - (2.0 * by[axis] - centre[axis]).abs() / REACH).max(0.0);
+        let near = near(0) * near(1);
+        if near == 0.0 {
             continue;
         }
-        let index = row * half.columns() as usize + column;
         let Some(other) = half.position_view(index) else { continue };
         let other_normal = half.normals_view()[index];
         let off_m = off_plane_m(other - place, normal, other_normal);
-        if off_m < nearest_m {
-            (nearest_m, nearest) = (off_m, values[index]);
-        }
-        let by = half.centre([column, row]);
-        let near = |axis: usize| (1.0 - (2.0 * by[axis] - centre[axis]).abs() / REACH).max(0.0);
         let alike = normal.dot(other_normal).max(0.0).powi(NORMAL_POWER);
-        let weight = near(0) * near(1) * alike * (1.0 - off_m / tolerance_m).max(0.0);
+        let weight = near * alike * (1.0 - off_m / tolerance_m).max(0.0);
         sum += weight * values[index];
         weights += weight;
     }
-    if weights > LEAST { sum / weights } else { nearest }
+    if weights > LEAST {
+        return sum / weights;
+    }
+    let (mut nearest_m, mut nearest) = (f32::INFINITY, 1.0);
+    for (_, index) in around() {
+        let Some(other) = half.position_view(index) else { continue };
+        let off_m = off_plane_m(other - place, normal, half.normals_view()[index]);
+        if off_m < nearest_m {
+            (nearest_m, nearest) = (off_m, values[index]);
+        }
+    }
+    nearest
 }
 
 /// How far each of two places lies from the plane of the other: the farther. Without normals, how far they are apart.

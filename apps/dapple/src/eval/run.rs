@@ -1,5 +1,7 @@
 //! Runs a plan: scene by scene, path by path, job by job. What was done before is taken from the journal.
 
+mod studies;
+
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
@@ -12,13 +14,11 @@ use super::figures::FrameError;
 use super::job::{Desk, Job, Outcome, jobs};
 use super::journal::Journal;
 use super::pair::{Start, Starts};
-use super::plan::{Entry, Plan, StudyEntry};
+use super::plan::{Entry, Plan};
 use super::results::{
-    Advice, Case, Failure, JudgeInfo, Machine, Results, RunInfo, SCHEMA, SceneInfo, StudyResult, Truth,
-    TruthFrame, commit,
+    Advice, Case, Failure, JudgeInfo, Machine, Results, RunInfo, SCHEMA, SceneInfo, Truth, TruthFrame, commit,
 };
 use super::stage::Stage;
-use super::study::Subject;
 use super::truth::Cache;
 use super::work::Work;
 use crate::args::EvalArgs;
@@ -181,65 +181,6 @@ impl Run<'_> {
             self.lock = lock(self.out)?;
         }
         Ok(())
-    }
-
-    /// One study; `more` are to come.
-    fn study(&mut self, study: &StudyEntry, more: usize) -> Result<StudyResult> {
-        let Some(entry) = &study.entry else {
-            self.open_folder()?;
-            return self.measure(study, None, None, more);
-        };
-        self.work.message(&format!("loading {}", entry.name));
-        let loaded = source::load(&entry.scene, None)?;
-        self.open_folder()?;
-        let radius = source::radius_of(&loaded.scene, entry.settings.radius)?;
-        let path = paths(&loaded, &entry.settings.paths)?.swap_remove(0);
-        let starts = Starts::new(&loaded.scene);
-        let stage = Stage::new(&loaded, &entry.settings, path, radius, starts.tracer().clone());
-        let name = format!("{} / {}", entry.name, stage.path.name);
-        self.measure(study, Some(&stage), Some(name), more)
-    }
-
-    fn measure(
-        &mut self,
-        study: &StudyEntry,
-        stage: Option<&Stage<'_>>,
-        subject: Option<String>,
-        more: usize,
-    ) -> Result<StudyResult> {
-        let what = match &subject {
-            Some(subject) => format!("study {}: {subject}", study.kind),
-            None => format!("study {}", study.kind),
-        };
-        let work = study.study.work(stage);
-        self.work.expect(1, work, more);
-        let key = self.journal.key(json!({
-            "study": format!("{:?}", study.study),
-            "kind": study.kind,
-            "stage": stage.map(|stage| self.identity(stage)),
-            "settings": stage.map(|stage| format!("{:?} {:?}", stage.settings.methods, stage.settings.effort)),
-        }));
-        if let Some(found) = self.journal.get(&key, |_: &StudyResult| Vec::new()) {
-            self.reused += 1;
-            self.work.finish(&what, work, false);
-            return Ok(found);
-        }
-        self.work.begin(&what);
-        let bar = &self.work;
-        let progress = |part: f64| bar.part(work, part);
-        let found = study.study.run(&Subject { stage, cache: &self.cache, progress: &progress })?;
-        let found = StudyResult {
-            kind: study.kind.clone(),
-            title: study.study.title().to_owned(),
-            subject,
-            notes: found.notes,
-            tables: found.tables,
-            plots: found.plots,
-            machine: Machine::here(),
-        };
-        self.journal.put(&key, &found)?;
-        self.work.finish(&what, work, true);
-        Ok(found)
     }
 
     /// All cases of one scene.

@@ -1,6 +1,6 @@
 //! Where screen space fails: four scenes whose visibility is known, as every method sees them. Their pictures stand in the README.
 
-use dapple_scene::{PosedCamera, Projection};
+use dapple_scene::PosedCamera;
 use glam::{Affine3A, Vec3};
 
 use crate::compose::view_visibility;
@@ -10,7 +10,7 @@ use crate::testing::screen::look;
 use crate::testing::{Stage, check_golden, cube, ground, quad};
 use crate::{alchemy, gtao, hbao, sao, ssao};
 
-const SIZE: [u32; 2] = [160, 120];
+const SIZE: [u32; 2] = [128, 96];
 
 /// A method with its defaults.
 type Method = (&'static str, fn(&Screen) -> Vec<f32>);
@@ -111,17 +111,16 @@ fn what_hangs_far_in_front_darkens_in_a_halo() {
 fn what_is_beyond_the_picture_is_missing() {
     let mut stage = Stage::new();
     stage.add(ground(20.0), 0, Affine3A::IDENTITY);
-    let projection = Projection::Orthographic { half_height: 1.0, near: 0.0, far: 20.0 };
-    let camera = PosedCamera { projection, ..look(Vec3::new(-4.0, 4.0, 0.0), Vec3::ZERO) };
-    // The picture's lower half is nearer to the eye; the box stands just right of it.
-    let right = SIZE[0] as f32 / SIZE[1] as f32;
-    stage.add(cube(), 0, place(Vec3::new(0.0, 0.25, right + 0.27), Vec3::new(9.0, 0.25, 0.25)));
-    let edge = |p: Vec3| p.z > right - 0.2;
+    let camera = look(Vec3::new(0.0, 3.0, 0.001), Vec3::ZERO);
+    // The box stands just right of the picture.
+    let right = 3.0 * libm::tanf(0.4) * SIZE[0] as f32 / SIZE[1] as f32;
+    stage.add(cube(), 0, place(Vec3::new(right + 0.27, 0.4, 0.0), Vec3::new(0.25, 0.4, 9.0)));
+    let edge = |p: Vec3| p.x > right - 0.2;
     let [without, with] = [0.0, 0.3].map(|guard| Seen::new(&stage, &camera, guard));
     let missed = all("off the picture, without", |method| without.mean(method, edge));
     let found = all("off the picture, with", |method| with.mean(method, edge));
     for (missed, found) in missed.iter().zip(&found) {
-        assert!(*missed > 0.985 && *found < 0.9, "{missed}, {found}");
+        assert!(*missed > 0.985 && *found < 0.88, "{missed}, {found}");
     }
     check_golden("sao", "failure-off-screen", &pair([(&without, of("sao")), (&with, of("sao"))]));
 }
@@ -132,13 +131,17 @@ fn thin_things_darken_like_thick_ones() {
     let mut stage = Stage::new();
     stage.add(ground(20.0), 0, Affine3A::IDENTITY);
     stage.add(cube(), 0, place(Vec3::new(0.0, 0.25, 0.0), Vec3::new(9.0, 0.01, 0.01)));
-    let seen = Seen::new(&stage, &look(Vec3::new(0.0, 2.6, 0.001), Vec3::ZERO), 0.2);
+    let seen = Seen::new(&stage, &look(Vec3::new(0.0, 1.6, 0.001), Vec3::ZERO), 0.2);
     let beside = |p: Vec3| (0.03..0.15).contains(&p.z.abs());
     let found = all("thin, truth 0.97", |method| seen.mean(method, beside));
     let [_, _, _, hbao, _, gtao] = found;
     assert!(hbao < 0.9, "all under the horizon is taken for solid: {found:?}");
     assert!(gtao < 0.92, "as thick as half of the radius: {found:?}");
-    check_golden("sao", "failure-thin", &pair([(&seen, of("sao")), (&seen, of("hbao"))]));
+    let mut picture = pair([(&seen, of("sao")), (&seen, of("hbao"))]);
+    // Rows in the middle: there is nothing in the others.
+    picture.pixels = picture.pixels[24 * picture.width as usize..][..48 * picture.width as usize].to_vec();
+    picture.height = 48;
+    check_golden("sao", "failure-thin", &picture);
 }
 
 /// A beam passes before a wall and hides it, not the ground at its foot: what the wall blocked comes back.

@@ -118,8 +118,8 @@ impl Study for Passes {
                 .chain(passes)
                 .chain([net, 1e6 * net / visible]);
             by_size.rows.push(row(format!("{} × {}", size[0], size[1]), values));
-            // One table of all methods, of the size next to the last or the only one: the paper's 1080 lines.
-            if number == sizes.len().saturating_sub(2) {
+            // One table of all methods, of a size in the middle: the paper's 1080 lines.
+            if number == (sizes.len() - 1) / 2 {
                 by_method.push(self.all_methods(subject, seen, &methods, size)?);
             }
             (subject.progress)((number + 1) as f64 / sizes.len() as f64);

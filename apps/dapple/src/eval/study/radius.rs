@@ -143,9 +143,11 @@ impl Study for Radius {
             StudyPlot { title: title.to_owned(), x, y, lines: lines.collect() }
         };
         let plots = vec![
-            plot("Bytes from memory", "a sample", "B", &|i| counted[i].memory),
-            plot("Bytes into the processors' own caches", "a sample", "B", &|i| counted[i].second),
-            plot("Time of the sampling pass here", "time", "ms", &|i| times[i]),
+            plot("Sampling pass, from memory", "bytes a sample", "", &|i| counted[i].memory),
+            plot("Sampling pass, into the processors' own caches", "bytes a sample", "", &|i| {
+                counted[i].second
+            }),
+            plot("Sampling pass here", "time", "ms", &|i| times[i]),
         ];
         let notes = vec![
             format!(
