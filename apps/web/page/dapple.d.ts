@@ -1,8 +1,13 @@
 // Types and documentation of dapple.js.
 
 /** How visibility is found: points through the atlas, points by the paper's look-up, or not at all. */
-/** Methods that look at the picture alone: they need no server, no stream and no points. */
-export type ScreenMethod = "ssao" | "alchemy" | "sao" | "hbao" | "hbao-plus" | "gtao";
+/**
+ * Methods that look at the picture alone: they need no server, no stream and no points. Those with `sd-` see hidden surfaces, too, by a stochastic depth map, which
+ * WebGL2 cannot make (`stats.problem` says so, and the scene is drawn without occlusion).
+ */
+export type ScreenMethod =
+  | "ssao" | "alchemy" | "sao" | "hbao" | "hbao-plus" | "gtao"
+  | "sd-ssao" | "sd-hbao" | "sd-hbao-plus";
 export type Method = "psao" | "psao-paper" | ScreenMethod | "none";
 
 /** What is shown. */

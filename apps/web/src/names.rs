@@ -38,7 +38,7 @@ impl std::error::Error for UnknownName {}
 const BACKENDS: [(&str, Backend); 3] =
     [("auto", Backend::Auto), ("webgpu", Backend::WebGpu), ("webgl2", Backend::WebGl2)];
 
-const METHODS: [(&str, Method); 9] = [
+const METHODS: [(&str, Method); 12] = [
     ("psao", Method::Psao),
     ("psao-paper", Method::PsaoPaper),
     screen(ScreenKind::Ssao),
@@ -47,6 +47,9 @@ const METHODS: [(&str, Method); 9] = [
     screen(ScreenKind::Hbao),
     screen(ScreenKind::HbaoPlus),
     screen(ScreenKind::Gtao),
+    screen(ScreenKind::SdSsao),
+    screen(ScreenKind::SdHbao),
+    screen(ScreenKind::SdHbaoPlus),
     ("none", Method::None),
 ];
 
@@ -70,7 +73,7 @@ pub fn backend(name: &str) -> Result<Backend, UnknownName> {
     find(&BACKENDS, "backend", name)
 }
 
-/// The method of that name: `psao`, `psao-paper`, `ssao`, `alchemy`, `sao`, `hbao`, `hbao-plus`, `gtao`, `none`.
+/// The method of that name: `psao`, `psao-paper`, `ssao`, `alchemy`, `sao`, `hbao`, `hbao-plus`, `gtao`, `sd-ssao`, `sd-hbao`, `sd-hbao-plus`, `none`.
 pub fn method(name: &str) -> Result<Method, UnknownName> {
     find(&METHODS, "method", name)
 }
@@ -122,7 +125,7 @@ mod tests {
         assert_eq!(fallback("none"), Ok(None));
         assert_eq!(effort("low"), Ok(Preset::Low));
         assert!(effort("most").unwrap_err().to_string().ends_with("low, medium, high, ultra"));
-        let known = "ssao, alchemy, sao, hbao, hbao-plus, gtao, none";
+        let known = "ssao, alchemy, sao, hbao, hbao-plus, gtao, sd-ssao, sd-hbao, sd-hbao-plus, none";
         assert_eq!(
             fallback("psao").unwrap_err().to_string(),
             format!("there is no fallback \"psao\": choose from {known}")

@@ -163,6 +163,12 @@ pub(crate) enum ViewMethod {
     HbaoPlus,
     /// Screen space: GTAO with a visibility bitmask.
     Gtao,
+    /// Screen space: SSAO over a stochastic depth map.
+    SdSsao,
+    /// Screen space: horizons over a stochastic depth map.
+    SdHbao,
+    /// Screen space: HBAO+ over a stochastic depth map.
+    SdHbaoPlus,
     /// No occlusion.
     None,
 }
@@ -177,6 +183,9 @@ impl ViewMethod {
             ViewMethod::Hbao => ScreenKind::Hbao,
             ViewMethod::HbaoPlus => ScreenKind::HbaoPlus,
             ViewMethod::Gtao => ScreenKind::Gtao,
+            ViewMethod::SdSsao => ScreenKind::SdSsao,
+            ViewMethod::SdHbao => ScreenKind::SdHbao,
+            ViewMethod::SdHbaoPlus => ScreenKind::SdHbaoPlus,
             ViewMethod::Psao | ViewMethod::PsaoPaper | ViewMethod::None => return None,
         })
     }

@@ -38,7 +38,7 @@ impl Quality {
 pub(super) const PRESETS: [(Preset, &str); 3] =
     [(Preset::Phone, "phone"), (Preset::Headset, "headset"), (Preset::Desktop, "desktop")];
 
-pub(super) const METHODS: [(Method, &str); 9] = [
+pub(super) const METHODS: [(Method, &str); 12] = [
     (Method::Psao, "psao"),
     (Method::PsaoPaper, "psao-paper"),
     screen(ScreenKind::Ssao),
@@ -47,6 +47,9 @@ pub(super) const METHODS: [(Method, &str); 9] = [
     screen(ScreenKind::Hbao),
     screen(ScreenKind::HbaoPlus),
     screen(ScreenKind::Gtao),
+    screen(ScreenKind::SdSsao),
+    screen(ScreenKind::SdHbao),
+    screen(ScreenKind::SdHbaoPlus),
     (Method::None, "none"),
 ];
 

@@ -25,6 +25,8 @@ pub(super) struct ScreenSpace {
     slots: [Slot; 2],
     /// Of the picture that is being drawn.
     kinds: [Option<ScreenKind>; 2],
+    /// Why one of its methods is not there.
+    missing: Option<String>,
 }
 
 /// What is drawn with the methods.
@@ -37,7 +39,7 @@ pub(super) struct Picture<'a> {
 
 impl ScreenSpace {
     pub(super) fn new() -> ScreenSpace {
-        ScreenSpace { slots: [Slot::Unmade, Slot::Unmade], kinds: [None; 2] }
+        ScreenSpace { slots: [Slot::Unmade, Slot::Unmade], kinds: [None; 2], missing: None }
     }
 
     /// Records the passes of the methods that a picture shows.
@@ -50,12 +52,17 @@ impl ScreenSpace {
         wanted: &[ScreenKind],
         options: &ScreenOptions,
     ) -> Result<(), ForwardError> {
-        self.kinds = [None; 2];
+        (self.kinds, self.missing) = ([None; 2], None);
         let Picture { scene, pose, camera, size } = picture;
         let part = options.guard_band.clamp(0.0, GuardBand::MAX_PART);
         let guard = GuardBand::of_height(part, size.1).unwrap_or_default();
         for &kind in wanted {
             if self.kinds.contains(&Some(kind)) {
+                continue;
+            }
+            let Chosen { params, half_resolution } = kind.preset(options.preset);
+            if let Err(error) = ScreenPasses::check_device(gpu, &params) {
+                self.missing = Some(format!("{}: {error}", kind.name()));
                 continue;
             }
             let Some(index) = self.kinds.iter().position(Option::is_none) else { break };
@@ -67,7 +74,6 @@ impl ScreenSpace {
                 };
             }
             let Slot::Made(passes) = slot else { continue };
-            let Chosen { params, half_resolution } = kind.preset(options.preset);
             let view = ScreenView {
                 camera: *camera,
                 size,
@@ -89,9 +95,10 @@ impl ScreenSpace {
 
     /// Why a method cannot be shown, if so.
     pub(super) fn problem(&self) -> Option<&str> {
-        self.slots.iter().find_map(|slot| match slot {
+        let failed = self.slots.iter().find_map(|slot| match slot {
             Slot::Failed(problem) => Some(problem.as_str()),
             _ => None,
-        })
+        });
+        failed.or(self.missing.as_deref())
     }
 }

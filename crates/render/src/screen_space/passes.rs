@@ -137,6 +137,19 @@ impl ScreenPasses {
         })
     }
 
+    /// Whether the device can run a method at all: some cannot draw stochastic depth maps.
+    ///
+    /// # Errors
+    /// What it lacks.
+    pub fn check_device(gpu: &Gpu, method: &ScreenMethod) -> Result<(), ForwardError> {
+        if hidden_layers(method) > 0 && !can_draw_maps(gpu) {
+            let reason = "this device cannot read samples of depths, which stochastic depth maps need (WebGL2 \
+                          never can): choose a method without sd- in its name";
+            return Err(ForwardError::Frame { reason });
+        }
+        Ok(())
+    }
+
     /// Records the method's passes for a picture and gives `forward` the result for its look-up. The view's camera and size, and the pose, must be those that the
     /// picture is then drawn with. The geometry is drawn anew, with the guard band.
     ///
@@ -184,11 +197,7 @@ impl ScreenPasses {
             ScreenMethod::Stochastic(_, stochastic) => Some(&stochastic.map),
             _ => None,
         };
-        if map.is_some() && !can_draw_maps(gpu) {
-            let reason = "this device cannot read samples of depths, which a stochastic depth map needs \
-                          (WebGL2 never can): choose a method without sd- in its name";
-            return Err(ForwardError::Frame { reason });
-        }
+        ScreenPasses::check_device(gpu, &view.method)?;
         if let Some(map) = map.filter(|map| self.choice.as_ref().map(HiddenChoice::params) != Some(map)) {
             self.choice = Some(HiddenChoice::new(gpu, map));
         }

@@ -4,10 +4,11 @@ use std::mem::offset_of;
 
 use dapple_gpu::testing::{check_struct, naga::ShaderStage, translate_to_webgl2, validate};
 
+use super::super::hidden::HiddenUniform;
 use super::super::lookup::{Lookup, built_in};
 use super::super::pipelines::{
     CLEAR_WGSL, DEFORM_WGSL, FRAME_WGSL, MATERIAL_WGSL, MATH_WGSL, caster_module, error_module,
-    forward_module, points_module,
+    forward_module, geometry_module, hidden_module, points_module,
 };
 use super::super::uniforms::*;
 
@@ -15,6 +16,13 @@ use super::super::uniforms::*;
 const GREEDY: &str = "fn lookup_visibility(s: LookupInput) -> f32 {
     return dot(s.position_rest + s.position_world, s.normal_rest + s.normal_world) * s.fade + f32(s.instance) + s.atlas.x;
 }";
+
+/// Name and offset of fields.
+macro_rules! members {
+    ($ty:ty: $($field:ident)*) => {
+        [$((stringify!($field), offset_of!($ty, $field))),*]
+    };
+}
 
 #[test]
 fn every_module_is_valid_and_within_webgl2() {
@@ -31,6 +39,13 @@ fn every_module_is_valid_and_within_webgl2() {
                 .unwrap_or_else(|e| panic!("{}, {entry}: {e}", lookup.label));
         }
     }
+    let geometry = validate(&geometry_module()).unwrap();
+    translate_to_webgl2(&geometry, ShaderStage::Fragment, "fragment").unwrap();
+    // Only where samples of depths can be read: not in WebGL2.
+    let hidden = validate(&hidden_module()).unwrap();
+    let members = members!(HiddenUniform: whole part alpha is_independent seed samples first_sample leaves_first_out
+        starts);
+    check_struct(&hidden, "HiddenParams", size_of::<HiddenUniform>(), &members).unwrap();
     let clear = validate(CLEAR_WGSL).unwrap();
     translate_to_webgl2(&clear, ShaderStage::Vertex, "clear_vertex").unwrap();
     for (module, vertex, fragment) in [
@@ -44,13 +59,6 @@ fn every_module_is_valid_and_within_webgl2() {
         }
         translate_to_webgl2(&module, ShaderStage::Fragment, fragment).unwrap();
     }
-}
-
-/// Name and offset of fields.
-macro_rules! members {
-    ($ty:ty: $($field:ident)*) => {
-        [$((stringify!($field), offset_of!($ty, $field))),*]
-    };
 }
 
 #[test]

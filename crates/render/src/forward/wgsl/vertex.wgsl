@@ -46,7 +46,8 @@ struct DetailedVertex {
 }
 
 struct Varyings {
-    @builtin(position) clip: vec4<f32>,
+    // Passes compare depths with each other's.
+    @builtin(position) @invariant clip: vec4<f32>,
     // In the world, relative to the eye.
     @location(0) relative: vec3<f32>,
     // Interpolates like the mesh's normals: not of unit length. Front side.
