@@ -118,3 +118,104 @@ fn precision_is_studied_without_a_scene() {
     let most = |row| value(&found, 0, row, 3);
     assert!((2..8).all(|row| most(0) > 10.0 * most(row)), "{found:?}");
 }
+
+#[test]
+fn more_samples_are_nearer_to_the_limit() {
+    let found = run("kind = \"layers\"", [128, 72]);
+    assert_eq!(found.tables.len(), 3);
+    for (table, shown) in found.tables.iter().enumerate() {
+        let off = |row| value(&found, table, row, 0);
+        let [none, ours_16, paper_16, limit] = [0, 5, 10, 11].map(off);
+        assert!(none > 0.001 && limit == 0.0, "{shown:?}");
+        assert!((1..6).all(|row| off(row) < 0.6 * none), "{shown:?}");
+        assert!(ours_16 < 0.2 * none && ours_16 < paper_16 && paper_16 < off(6), "{shown:?}");
+        assert!(shown.rows[11].values[1].is_none() && value(&found, table, 0, 2) == 0.0, "{shown:?}");
+        assert!((value(&found, table, 3, 2) - 100.0 * (1.0 - off(3) / none)).abs() < 1e-9);
+        // All layers are nearer to the truth than one, which is too light.
+        assert!(value(&found, table, 11, 4) < value(&found, table, 0, 4), "{shown:?}");
+    }
+}
+
+#[test]
+fn costs_are_of_all_passes_and_beside_those_of_one_layer() {
+    let found = run("kind = \"map-cost\"\nrepeats = 3", [96, 54]);
+    let names: Vec<&str> = found.tables.iter().map(|table| table.title.as_str()).collect();
+    assert_eq!(names.len(), 6);
+    assert_eq!(names[4..], ["hbao-plus", "hbao-plus, the paper's parameters"]);
+    for (table, shown) in found.tables.iter().enumerate() {
+        assert_eq!(shown.rows.len(), 7);
+        assert!(shown.rows[0].values[0].is_none(), "no map, no time of it: {shown:?}");
+        for (number, _) in shown.rows.iter().enumerate() {
+            let all = value(&found, table, number, 3);
+            let passes = shown.rows[number].values[..3].iter().flatten();
+            assert!(passes.clone().all(|ms| *ms > 0.0), "{shown:?}");
+            // A median of sums is not the sum of medians.
+            let sum: f64 = passes.sum();
+            assert!((0.3 * all..2.0 * all).contains(&sum), "{shown:?}");
+            let ratio = all / value(&found, table, 0, 3);
+            assert!((value(&found, table, number, 4) - ratio).abs() < 1e-9, "{shown:?}");
+        }
+        // Sixteen samples take longer than none, and less at half resolution.
+        assert!(value(&found, table, 5, 4) > 1.0 && value(&found, table, 5, 7) < value(&found, table, 5, 3));
+    }
+    // 2.313 over 1.042.
+    assert!((value(&found, 4, 3, 10) - 2.2198).abs() < 1e-3);
+}
+
+#[test]
+fn compensation_darkens() {
+    let found = run("kind = \"compensation\"\nfactors = [0.0, 1.0, 2.0]\nsamples = 1", [96, 54]);
+    assert_eq!(found.tables[1].rows.len(), 6);
+    for row in 0..6 {
+        let bias = [0, 1, 2].map(|column| value(&found, 1, row, column));
+        assert!(bias[0] > bias[1] && bias[1] > bias[2], "{bias:?}");
+    }
+}
+
+#[test]
+fn two_cameras_are_timed_and_judged() {
+    let found = run("kind = \"multi-view\"\nrepeats = 2", [96, 54]);
+    let time = |row, column| value(&found, 0, row, column);
+    for row in 1..5 {
+        assert!(time(row, 1) > time(row, 0) && time(row, 2) < time(row, 1), "{:?}", found.tables[0]);
+        assert!((value(&found, 2, row - 1, 1) - time(row, 1) / time(row, 0)).abs() < 1e-9);
+        // Two cameras find more that blocks.
+        assert!(value(&found, 5, row, 1) < value(&found, 5, row, 0), "{:?}", found.tables[5]);
+        assert_ne!(value(&found, 4, row, 1), value(&found, 4, row, 3), "a coarser second picture");
+    }
+}
+
+#[test]
+fn places_that_stay_visible_change_less_the_more_is_known() {
+    let text = "kind = \"pop-in\"\nsteps = 4";
+    let found = run(text, [160, 90]);
+    let table = &found.tables[0];
+    let of = |name: &str| {
+        let row = table.rows.iter().position(|row| row.name == name).unwrap();
+        [0, 2, 4].map(|column| value(&found, 0, row, column))
+    };
+    let [truth, single, limit] = ["truth", "hbao-plus", "hbao-plus-peeled"].map(of);
+    assert_eq!(truth[1..], [0.0, 0.0], "nothing is off itself");
+    assert!(single[1] > 0.0 && single[2] > limit[2], "{single:?}, {limit:?}");
+    assert!(found.plots[0].lines.iter().all(|line| line.points.len() == 5));
+    assert_eq!(found.plots[0].lines.len(), ScreenSpace::ALL.len() + 1);
+}
+
+#[test]
+fn layers_before_what_is_hidden_take_its_place() {
+    let found = run("kind = \"hidden-layers\"\nplates = [0, 8]", [160, 90]);
+    for (table, shown) in found.tables.iter().enumerate() {
+        // Of what four samples find alone, and doubled.
+        let part = |row, column| value(&found, table, row, column);
+        assert!(part(0, 8) > 50.0 && part(1, 8) < part(0, 8) - 5.0, "{shown:?}");
+        assert!(part(1, 9) > part(1, 8) && part(1, 10) > part(1, 8), "{shown:?}");
+    }
+}
+
+#[test]
+fn each_departure_from_the_paper_removes_more() {
+    let found = run("kind = \"map-rules\"", [160, 90]);
+    let removed = |row| value(&found, 0, row, 2);
+    assert!(removed(6) > 70.0 && removed(6) > removed(0) + 10.0, "{:?}", found.tables[0]);
+    assert!(removed(5) > removed(4) && removed(11) > 99.0, "{:?}", found.tables[0]);
+}
