@@ -43,31 +43,16 @@ fn way_name((samples, factor): (u32, f32)) -> String {
     if factor == 1.0 { format!("S = {samples}") } else { format!("S = {samples}, × {factor}") }
 }
 
-/// The scene with a grille of so many layers of bars before the camera.
-fn with_grille(scene: &Scene, camera: &PosedCamera, radius_m: f32, layers: u32) -> Scene {
-    let mut scene = scene.clone();
-    let mut mesh = Mesh { name: "grille".to_owned(), ..Mesh::default() };
-    let reach = APART * TO_EACH_SIDE as f32;
-    for layer in 0..layers {
-        for bar in -TO_EACH_SIDE..=TO_EACH_SIDE {
-            let first = mesh.positions.len() as u32;
-            let middle = APART * bar as f32;
-            for [x, y] in [[-WIDE, -reach], [WIDE, -reach], [WIDE, reach], [-WIDE, reach]] {
-                let at = Vec3::new(middle + 0.5 * x, y, -AHEAD - BETWEEN * layer as f32);
-                mesh.positions.push(camera.world_from_view.transform_point3(at * radius_m));
-                mesh.normals.push(camera.world_from_view.transform_vector3(Vec3::Z));
-            }
-            mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
-        }
-    }
-    scene.materials.push(Material::default());
+/// Adds a mesh in world space, seen from both sides.
+pub(super) fn add_mesh(scene: &mut Scene, mut mesh: Mesh) {
+    scene.materials.push(Material { double_sided: true, ..Material::default() });
     mesh.parts = vec![Part {
         first_triangle: 0,
         triangle_count: mesh.triangles.len() as u32,
         material: scene.materials.len() as u32 - 1,
     }];
     scene.meshes.push(mesh);
-    scene.nodes.push(Node { name: "grille".to_owned(), ..Node::default() });
+    scene.nodes.push(Node::default());
     scene.instances.push(Instance {
         node: scene.nodes.len() as u32 - 1,
         mesh: scene.meshes.len() as u32 - 1,
@@ -77,6 +62,34 @@ fn with_grille(scene: &Scene, camera: &PosedCamera, radius_m: f32, layers: u32) 
         rest_from_mesh: Mat3::IDENTITY,
         spare: false,
     });
+}
+
+/// Adds a rectangle by its corners, counter-clockwise.
+pub(super) fn add_rectangle(mesh: &mut Mesh, corners: [Vec3; 4]) {
+    let first = mesh.positions.len() as u32;
+    let normal = (corners[1] - corners[0]).cross(corners[3] - corners[0]).normalize_or_zero();
+    mesh.positions.extend(corners);
+    mesh.normals.extend([normal; 4]);
+    mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+}
+
+/// The scene with a grille of so many layers of bars before the camera.
+fn with_grille(scene: &Scene, camera: &PosedCamera, radius_m: f32, layers: u32) -> Scene {
+    let mut scene = scene.clone();
+    let mut mesh = Mesh::default();
+    let reach = APART * TO_EACH_SIDE as f32;
+    for layer in 0..layers {
+        for bar in -TO_EACH_SIDE..=TO_EACH_SIDE {
+            let middle = APART * bar as f32;
+            let corners = [[-WIDE, -reach], [WIDE, -reach], [WIDE, reach], [-WIDE, reach]];
+            let corners = corners.map(|[x, y]| {
+                let at = Vec3::new(middle + 0.5 * x, y, -AHEAD - BETWEEN * layer as f32);
+                camera.world_from_view.transform_point3(at * radius_m)
+            });
+            add_rectangle(&mut mesh, corners);
+        }
+    }
+    add_mesh(&mut scene, mesh);
     scene
 }
 

@@ -69,8 +69,7 @@ pub(super) fn medians(
     let mut times: Vec<Times> = runs.iter().map(|_| Times::default()).collect();
     for repeat in 0..repeats {
         for ((method, effort), times) in runs.iter().zip(&mut times) {
-            let (mut number, start) = (0, Instant::now());
-            let mut last = start;
+            let (mut number, mut sum, mut last) = (0, 0.0, Instant::now());
             method.on_screen(&seen.screen, &sight, *effort, &mut |pass| {
                 let ms = 1e3 * last.elapsed().as_secs_f64();
                 if number == times.passes.len() {
@@ -78,9 +77,10 @@ pub(super) fn medians(
                 }
                 times.passes[number].1.push(ms);
                 number += 1;
+                sum += ms;
                 last = Instant::now();
             })?;
-            times.sums.push(1e3 * start.elapsed().as_secs_f64());
+            times.sums.push(sum);
         }
         (subject.progress)(f64::from(repeat + 1) / f64::from(repeats));
     }
