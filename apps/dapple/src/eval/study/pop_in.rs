@@ -29,10 +29,10 @@ impl Default for PopIn {
 
 /// Part of the radius that a patch of a surface is long: the mean over it is compared, so that noise of single samples is not.
 const PATCH: f32 = 0.25;
-/// Places that a patch has at least.
+/// Places that a patch has at least, one a sample.
 const FEWEST: usize = 12;
-/// Of every so many samples across and down one is a place.
-const STRIDE: u32 = 2;
+/// Of a patch about so many places are traced.
+const TRACED: usize = 8;
 /// A larger change than the truth's is counted.
 const POP: f64 = 0.05;
 
@@ -112,11 +112,9 @@ impl PopIn {
         let stage = subject.stage()?;
         let scene = stage.scene();
         let moving = scene.moving_instances();
-        let (edge_m, columns) = (PATCH * stage.radius_m, step.gbuffer.width_samples());
+        let edge_m = PATCH * stage.radius_m;
         let found = step.gbuffer.map_surfaces(scene, &step.moment.pose, |index, surface| {
-            let [x, y] = [index as u32 % columns, index as u32 / columns];
-            let chosen = x.is_multiple_of(STRIDE) && y.is_multiple_of(STRIDE);
-            let surface = surface.filter(|s| chosen && !moving[s.instance as usize])?;
+            let surface = surface.filter(|s| !moving[s.instance as usize])?;
             let [x, y, z] = (surface.position_world / edge_m).to_array().map(|part| part.floor() as i32);
             let normal = surface.normal_world.to_array();
             let widest = (0..3).max_by(|a, b| normal[*a].abs().total_cmp(&normal[*b].abs()))?;
@@ -249,7 +247,7 @@ impl Study for PopIn {
         };
         let notes = vec![format!(
             "{pieces} pieces of the path, {} steps at {CLIENT_HZ} Hz each, pictures of {} × {} pixels, one sample each. A patch is the places of a still surface within a cube of {PATCH} of the radius that every picture of a \
-             piece shows, at least {FEWEST}; its mean visibility counts. {patches_of_all} patches. The truth is traced from the same places with the same rays; what it changes is that other things move. Where {} \
+             piece shows, at least {FEWEST}; its mean visibility counts. {patches_of_all} patches. The truth is traced from about {TRACED} places of each, with the same rays in every picture: it changes where other things move. Where {} \
              jumps most (plot, from {:.2} s), it changes by {:.3} more than the truth in a step.",
             self.steps,
             stage.settings.size.width,
@@ -301,7 +299,10 @@ impl PopIn {
             radius_m: stage.radius_m,
             seed: stage.settings.seed.into(),
         };
-        // Those of patches alone.
+        let some = |patch: &Vec<usize>| -> Vec<usize> {
+            patch.iter().step_by(patch.len().div_ceil(TRACED)).copied().collect()
+        };
+        let patches: Vec<Vec<usize>> = patches.iter().map(some).collect();
         let wanted: Vec<usize> = patches.iter().flatten().copied().collect();
         let sites: Vec<Site> = wanted.iter().map(|place| places[*place].site).collect();
         let mut all = vec![1.0; places.len()];
@@ -309,7 +310,7 @@ impl PopIn {
             let mut visibility = vec![1.0; sites.len()];
             trace_visibility(&stage.tracer_in(&step.moment.pose), &sites, &params, &mut visibility);
             wanted.iter().zip(visibility).for_each(|(place, value)| all[*place] = value);
-            means(patches, |place| all[place])
+            means(&patches, |place| all[place])
         });
         Ok(turned(&by_step.collect::<Vec<_>>()))
     }
