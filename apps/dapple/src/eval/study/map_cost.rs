@@ -131,7 +131,7 @@ impl Study for MapCost {
 
     fn work(&self, stage: Option<&Stage<'_>>) -> f64 {
         stage.map_or(1e7, |stage| {
-            3000.0
+            1500.0
                 * f64::from(self.repeats)
                 * f64::from(stage.settings.size.width)
                 * f64::from(stage.settings.size.height)

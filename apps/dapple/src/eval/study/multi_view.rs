@@ -70,7 +70,7 @@ impl Study for MultiView {
 
     fn work(&self, stage: Option<&Stage<'_>>) -> f64 {
         let own = stage.map_or(1e7, |stage| stage.samples() as f64);
-        1000.0 * own * (f64::from(self.repeats) + stage.map_or(1.0, |stage| stage.frame_times_s.len() as f64))
+        300.0 * own * (f64::from(self.repeats) + stage.map_or(1.0, |stage| stage.frame_times_s.len() as f64))
     }
 
     fn run(&self, subject: &Subject<'_>) -> Result<Findings> {
