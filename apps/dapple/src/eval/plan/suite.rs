@@ -43,7 +43,7 @@ const BUILTIN: [(&str, &str, &str); 7] = [
     (
         "stochastic",
         include_str!("../../../suites/stochastic.toml"),
-        "stochastic depth on three built-in scenes, against all layers and the truth, with its studies",
+        "stochastic depth on two built-in scenes, against all layers and the truth, with its studies",
     ),
     (
         "stochastic-others",

@@ -130,12 +130,12 @@ impl Study for LayersStudy {
         ];
         let notes = vec![
             format!(
-                "{count} pictures of {} × {} pixels, {} samples each, guard band {} of the height. Off: mean absolute difference of visibility over pixels. The limit is the method's own over all layers (depth \
+                "{count} pictures of {} × {} pixels, {n} × {n} samples each, guard band {} of the height. Off: mean absolute difference of visibility over pixels. The limit is the method's own over all layers (depth \
                  peeling); removed is the part of the single layer's mean difference from it. Positive bias is too light.",
                 stage.settings.size.width,
                 stage.settings.size.height,
-                stage.settings.supersample * stage.settings.supersample,
                 effort.guard_band,
+                n = stage.settings.supersample,
             ),
             "The paper's figures 4 and 5 are pictures without numbers. Its parameters: α = 0.2, the first surface among the others, hidden ones looked at where the first is farther than the radius.".to_owned(),
         ];
