@@ -149,30 +149,36 @@ impl Study for HiddenLayers {
                 (subject.progress)(done / moments.len() as f64);
             }
         }
-        let bias = |errors: &Errors| errors.bias();
-        let table = |method: usize| StudyTable {
-            title: methods[method].name().to_owned(),
-            columns: std::iter::once(column("no map", "", 4))
-                .chain(WAYS.map(|way| column(&way_name(way), "", 4)))
-                .chain(WAYS.map(|way| column(&format!("found by {}", way_name(way)), "%", 0)))
-                .collect(),
-            rows: self
-                .plates
-                .iter()
-                .zip(&found[method])
-                .map(|(plates, found)| {
-                    let part = |errors: &Errors| 100.0 * (1.0 - errors.bias() / found[0].bias());
-                    let values = found.iter().map(bias).chain(found[1..].iter().map(part));
-                    row(format!("{plates} more"), values)
-                })
-                .collect(),
+        let rows = |method: usize, values: &dyn Fn(&[Errors]) -> Vec<f64>| {
+            let found = self.plates.iter().zip(&found[method]);
+            found.map(|(plates, found)| row(format!("{plates} more"), values(found))).collect()
         };
-        let tables = (0..methods.len()).map(table).collect();
+        let part = |found: &[Errors]| -> Vec<f64> {
+            found[1..].iter().map(|errors| 100.0 * (1.0 - errors.bias() / found[0].bias())).collect()
+        };
+        let tables = (0..methods.len()).flat_map(|method| {
+            let name = methods[method].name();
+            let ways = |unit: &str, digits| WAYS.map(|way| column(&way_name(way), unit, digits));
+            let bias = StudyTable {
+                title: format!("{name}, bias to the limit"),
+                columns: std::iter::once(column("no map", "", 4)).chain(ways("", 4)).collect(),
+                rows: rows(method, &|found| found.iter().map(Errors::bias).collect()),
+            };
+            let found = StudyTable {
+                title: format!("{name}, part of the hidden occlusion that is found"),
+                columns: ways("%", 0).to_vec(),
+                rows: rows(method, &part),
+            };
+            [bias, found]
+        });
+        let tables = tables.collect();
         let lines = methods.iter().zip(&found).flat_map(|(method, found)| {
-            [2usize, 3, 4].map(|way| {
-                let points = self.plates.iter().zip(found).map(|(plates, found)| {
-                    [f64::from(*plates), 100.0 * (1.0 - found[way + 1].bias() / found[0].bias())]
-                });
+            [2, 3, 4].map(|way: usize| {
+                let points = self
+                    .plates
+                    .iter()
+                    .zip(found)
+                    .map(|(plates, found)| [f64::from(*plates), part(found)[way]]);
                 let points: Vec<[f64; 2]> = points.filter(|[_, y]| y.is_finite()).collect();
                 line(format!("{}, {}", method.name(), way_name(WAYS[way])), points)
             })

@@ -83,16 +83,16 @@ impl OfMethod {
             column("samples", "ms", 1),
             column("blur", "ms", 1),
             column("all", "ms", 1),
-            column("to no map", "×", 2),
-            column("samples to no map", "×", 2),
+            column("all", "×", 2),
+            column("samples", "×", 2),
             column("half: map", "ms", 1),
             column("half: all", "ms", 1),
-            column("half: to no map", "×", 2),
-            column("Table 1, samples", "×", 2),
+            column("half: all", "×", 2),
+            column("Table 1", "×", 2),
         ];
         let has_table_2 = self.method == Layered::HbaoPlus;
         if has_table_2 {
-            columns.extend([column("Table 2", "×", 2), column("Table 2, half", "×", 2)]);
+            columns.extend([column("Table 2", "×", 2), column("half", "×", 2)]);
         }
         let (full, half, samples) = (self.all(0), self.all(1), self.samples());
         let rows = (0..ROWS).map(|number| {
@@ -190,7 +190,7 @@ impl Study for MapCost {
         };
         let notes = vec![
             format!(
-                "One picture of {} × {} pixels at {:.2} s of the path, {} samples with the guard band; medians of {} runs in turn, on {} threads of {}. All is the map, the samples and the blur; the G-buffer and its \
+                "One picture of {} × {} pixels at {:.2} s of the path, {} samples with the guard band; medians of {} runs in turn, on {} threads of {}. All is the map, the samples and the blur, × as many times those of no map; the G-buffer and its \
                  normals, which every method needs, are not counted. At half resolution the map is drawn at full resolution and every fourth of its samples kept.",
                 size[0],
                 size[1],
