@@ -43,11 +43,11 @@ pub(crate) enum Layered {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Stochastic {
     /// Of each sample of the picture: 1, 2, 4, 8 or 16.
-    samples: u32,
+    pub(crate) samples: u32,
     /// Of a second camera beside the first one, too; HBAO+ alone.
-    two_cameras: bool,
+    pub(crate) two_cameras: bool,
     /// The paper's parameters, not those that are best here.
-    paper: bool,
+    pub(crate) paper: bool,
 }
 
 impl Stochastic {
@@ -60,9 +60,18 @@ impl Stochastic {
 }
 
 impl Layered {
-    const ALL: [Layered; 3] = [Layered::Ssao, Layered::Hbao, Layered::HbaoPlus];
+    pub(crate) const ALL: [Layered; 3] = [Layered::Ssao, Layered::Hbao, Layered::HbaoPlus];
 
-    fn name(self) -> &'static str {
+    /// As it is without hidden surfaces.
+    pub(crate) fn single(self) -> ScreenSpace {
+        match self {
+            Layered::Ssao => ScreenSpace::Ssao,
+            Layered::Hbao => ScreenSpace::Hbao,
+            Layered::HbaoPlus => ScreenSpace::HbaoPlus,
+        }
+    }
+
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Layered::Ssao => "ssao",
             Layered::Hbao => "hbao",
@@ -114,11 +123,21 @@ pub(crate) struct Effort {
     pub(crate) half_resolution: Option<bool>,
     /// Part of the picture's height.
     pub(crate) guard_band: f32,
+    /// What occlusion by hidden surfaces is multiplied by, 1.
+    pub(crate) compensation: f32,
+    /// Samples of the picture along a side of one of a second camera's, 1.
+    pub(crate) second_coarseness: u32,
 }
 
 impl Default for Effort {
     fn default() -> Self {
-        Effort { preset: Preset::default(), half_resolution: None, guard_band: Effort::GUARD_BAND }
+        Effort {
+            preset: Preset::default(),
+            half_resolution: None,
+            guard_band: Effort::GUARD_BAND,
+            compensation: 1.0,
+            second_coarseness: 1,
+        }
     }
 }
 
@@ -285,6 +304,12 @@ fn layered(
     after: AfterPass<'_>,
 ) -> Result<Vec<f32>, RenderError> {
     let Sight { scene, pose, camera, gbuffer, radius_m, seed } = *sight;
+    let preset = effort.preset;
+    let of_preset = match method {
+        Layered::Ssao => preset.ssao().half_resolution,
+        _ => method.hbao(preset, radius_m).half_resolution,
+    };
+    let half_resolution = effort.half_resolution.unwrap_or(of_preset);
     let (mut is_paper, mut side) = (false, None);
     let known = match depths {
         None => Known::Nothing,
@@ -295,7 +320,10 @@ fn layered(
             after("map");
             if stochastic.two_cameras {
                 let size = [screen.columns(), screen.rows()];
-                side = Some(SideView::draw(scene, pose, camera, size, &SideParams::default(), &params)?);
+                // As coarse as the first.
+                let coarseness = effort.second_coarseness * if half_resolution { 2 } else { 1 };
+                let second = SideParams { coarseness, ..SideParams::default() };
+                side = Some(SideView::draw(scene, pose, camera, size, &second, &params)?);
                 after("second map");
             }
             Known::Map(map)
@@ -307,14 +335,8 @@ fn layered(
             Known::Layers(layers)
         }
     };
-    let preset = effort.preset;
-    let of_preset = match method {
-        Layered::Ssao => preset.ssao().half_resolution,
-        _ => method.hbao(preset, radius_m).half_resolution,
-    };
-    let half_resolution = effort.half_resolution.unwrap_or(of_preset);
     let known = if half_resolution { known.half() } else { known };
-    let lookup = known.lookup(is_paper);
+    let lookup = Lookup { compensation: effort.compensation, ..known.lookup(is_paper) };
     let run = |screen: &Screen, after: AfterPass<'_>| match (method, &side) {
         (Layered::Ssao, _) => {
             let params = ssao::SsaoParams { radius_m, seed, ..preset.ssao().params };

@@ -20,6 +20,11 @@ pub(crate) struct EffortArgs {
 
 impl EffortArgs {
     pub(crate) fn effort(self) -> Effort {
-        Effort { preset: self.ao_preset, half_resolution: self.half_resolution, guard_band: self.guard_band }
+        Effort {
+            preset: self.ao_preset,
+            half_resolution: self.half_resolution,
+            guard_band: self.guard_band,
+            ..Effort::default()
+        }
     }
 }

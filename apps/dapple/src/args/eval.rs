@@ -19,6 +19,7 @@ Examples:
   dapple eval --builtin atrium,lab --path all --points 512,1024 --hz 15,60 --size 960x540 --frames 8
   dapple eval --suite builtins --frames 2        every built-in scene, in a few minutes
   dapple eval --suite sao                        screen-space methods, with the tables and plots of SAO's paper
+  dapple eval --suite stochastic                 hidden surfaces: a paper's tables and figures, in ten minutes
   dapple eval --suite mine.toml --threads 1      scenes and settings from a file (docs/suites.md)
   dapple eval --smoke                            assert the bounds that the tests assert
 
@@ -228,6 +229,7 @@ impl Options {
             preset: self.ao_preset.unwrap_or_default(),
             half_resolution: self.half_resolution,
             guard_band: self.guard_band.unwrap_or(Effort::GUARD_BAND),
+            ..Effort::default()
         }
     }
 }

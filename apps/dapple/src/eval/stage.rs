@@ -6,7 +6,7 @@ use std::rc::Rc;
 use anyhow::Result;
 use dapple_client::{Drawn, PictureParams, draw};
 use dapple_render::shade::{Gathering, Openings, ShadeParams, shade_gathered};
-use dapple_scene::{CameraPath, PosedCamera, Scene};
+use dapple_scene::{CameraPath, Pose, PosedCamera, Scene};
 use dapple_trace::Tracer;
 
 use super::plan::{CLIENT_HZ, Settings};
@@ -215,10 +215,15 @@ impl<'a> Stage<'a> {
 
     /// The scene's tracer in a picture's pose.
     pub(super) fn tracer_at(&self, drawn: &Drawn) -> Ref<'_, Tracer> {
-        if self.tracer.borrow().1 != Some(drawn.pose.time) {
+        self.tracer_in(&drawn.pose)
+    }
+
+    /// The scene's tracer in a pose of the scene.
+    pub(super) fn tracer_in(&self, pose: &Pose) -> Ref<'_, Tracer> {
+        if self.tracer.borrow().1 != Some(pose.time) {
             let mut tracer = self.tracer.borrow_mut();
-            tracer.0.update(self.scene(), &drawn.pose);
-            tracer.1 = Some(drawn.pose.time);
+            tracer.0.update(self.scene(), pose);
+            tracer.1 = Some(pose.time);
         }
         Ref::map(self.tracer.borrow(), |tracer| &tracer.0)
     }

@@ -5,8 +5,6 @@
 mod bent;
 mod hidden;
 mod map;
-#[cfg(test)]
-mod measure;
 mod multi_view;
 mod picks;
 #[cfg(test)]

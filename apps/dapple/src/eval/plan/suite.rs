@@ -14,7 +14,7 @@ use crate::source::read_limited;
 const MAX_BYTES: u64 = 1 << 20;
 
 /// Suites that the program brings, by name.
-const BUILTIN: [(&str, &str, &str); 5] = [
+const BUILTIN: [(&str, &str, &str); 7] = [
     (
         "builtins",
         include_str!("../../../suites/builtins.toml"),
@@ -38,6 +38,16 @@ const BUILTIN: [(&str, &str, &str); 5] = [
     (
         "sao-others",
         include_str!("../../../suites/sao-others.toml"),
+        "the same on scenes by others, found with --scenes-folder",
+    ),
+    (
+        "stochastic",
+        include_str!("../../../suites/stochastic.toml"),
+        "stochastic depth on two built-in scenes, against all layers and the truth, with its studies",
+    ),
+    (
+        "stochastic-others",
+        include_str!("../../../suites/stochastic-others.toml"),
         "the same on scenes by others, found with --scenes-folder",
     ),
 ];

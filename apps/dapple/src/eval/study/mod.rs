@@ -2,9 +2,17 @@
 //!
 //! A kind is a [`Study`] and a line in [`KINDS`].
 
+mod compensation;
 mod guard_band;
+mod hidden_layers;
+mod layers;
+mod map_cost;
+mod map_rules;
+mod medians;
 mod mip_filters;
+mod multi_view;
 mod passes;
+mod pop_in;
 mod presets;
 mod radius;
 #[cfg(test)]
@@ -21,7 +29,7 @@ use super::results::{StudyAxis, StudyColumn, StudyLine, StudyPlot, StudyRow, Stu
 use super::stage::Stage;
 use super::truth::Cache;
 use crate::args::Method;
-use crate::screen_space::{ScreenSpace, Sight};
+use crate::screen_space::{Layered, ScreenSpace, Sight, Stochastic};
 
 /// A kind of study with its own settings.
 pub(super) trait Study: std::fmt::Debug {
@@ -46,13 +54,20 @@ pub(super) trait Study: std::fmt::Debug {
 type Reader = fn(&mut toml::Table) -> Result<Box<dyn Study>>;
 
 /// Every kind by its name.
-const KINDS: [(&str, Reader); 6] = [
+const KINDS: [(&str, Reader); 13] = [
     ("z-precision", |table| own::<z_precision::ZPrecision>(table, &["distances", "triangles"])),
     ("mip-filters", |table| own::<mip_filters::MipFilters>(table, &[])),
     ("radius", |table| own::<radius::Radius>(table, &["radii", "line-bytes"])),
     ("passes", |table| own::<passes::Passes>(table, &["sizes", "repeats"])),
     ("presets", |table| own::<presets::Presets>(table, &[])),
     ("guard-band", |table| own::<guard_band::GuardBands>(table, &["parts"])),
+    ("layers", |table| own::<layers::LayersStudy>(table, &[])),
+    ("map-cost", |table| own::<map_cost::MapCost>(table, &["repeats"])),
+    ("map-rules", |table| own::<map_rules::MapRules>(table, &[])),
+    ("compensation", |table| own::<compensation::Compensation>(table, &["factors", "samples"])),
+    ("hidden-layers", |table| own::<hidden_layers::HiddenLayers>(table, &["plates"])),
+    ("multi-view", |table| own::<multi_view::MultiView>(table, &["repeats"])),
+    ("pop-in", |table| own::<pop_in::PopIn>(table, &["steps"])),
 ];
 
 /// The study of a name, with its settings.
@@ -122,6 +137,14 @@ impl<'a> Subject<'a> {
         Ok(if asked.is_empty() { ScreenSpace::ALL.to_vec() } else { asked })
     }
 
+    /// The methods that can look behind the first surface, of those that are asked for; all if none of them is.
+    pub(super) fn layered(&self) -> Result<Vec<Layered>> {
+        let methods = self.methods()?;
+        let asked: Vec<Layered> =
+            Layered::ALL.into_iter().filter(|method| methods.contains(&method.single())).collect();
+        Ok(if asked.is_empty() { Layered::ALL.to_vec() } else { asked })
+    }
+
     /// What is seen in a picture of so many pixels, one sample a pixel, with the guard band around it.
     pub(super) fn look(&self, moment: &Moment, size: [u32; 2], band: GuardBand) -> Result<(GBuffer, Screen)> {
         let scene = self.stage()?.scene();
@@ -164,6 +187,14 @@ pub(super) fn line(name: impl Into<String>, points: impl IntoIterator<Item = [f6
     StudyLine { name: name.into(), points: points.into_iter().collect() }
 }
 
+/// Samples of a stochastic depth map.
+pub(super) const SAMPLES: [u32; 5] = [1, 2, 4, 8, 16];
+
+/// A method over a stochastic depth map.
+pub(super) fn stochastic(method: Layered, samples: u32, paper: bool) -> ScreenSpace {
+    ScreenSpace::Stochastic(method, Stochastic { samples, two_cameras: false, paper })
+}
+
 /// PSNR of a mean squared error with peak 1, in dB; infinite where there is none.
 pub(super) fn psnr_db(mse: f64) -> f64 {
     -10.0 * libm::log10(mse)
@@ -174,6 +205,7 @@ pub(super) fn psnr_db(mse: f64) -> f64 {
 pub(super) struct Errors {
     squares: f64,
     sum: f64,
+    absolute: f64,
     count: f64,
 }
 
@@ -182,7 +214,19 @@ impl Errors {
         let off = f64::from(found) - f64::from(expected);
         self.squares += off * off;
         self.sum += off;
+        self.absolute += off.abs();
         self.count += 1.0;
+    }
+
+    /// Adds all pixels that show something.
+    pub(super) fn add_covered(&mut self, found: &[f32], expected: &[f32], covered: &[bool]) {
+        let pixels = found.iter().zip(expected).zip(covered).filter(|(_, covered)| **covered);
+        pixels.for_each(|((found, expected), _)| self.add(*found, *expected));
+    }
+
+    /// Mean absolute difference.
+    pub(super) fn mean(&self) -> f64 {
+        self.absolute / self.count
     }
 
     /// Infinite where nothing is off.

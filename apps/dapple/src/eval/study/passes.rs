@@ -107,7 +107,9 @@ impl Study for Passes {
                 1e3 * start.elapsed().as_secs_f64()
             });
             let z0_ms = z0_ms.fold(f64::INFINITY, f64::min);
-            let seen = (moment, &gbuffer, &screen);
+            // Methods that draw more than the G-buffer draw it for the same camera.
+            let wide = Moment { pose: moment.pose.clone(), camera };
+            let seen = (&wide, &gbuffer, &screen);
             let sao_effort = Effort { half_resolution: Some(false), ..effort };
             let times = times_ms(subject, seen, ScreenSpace::Sao, sao_effort, self.repeats)?;
             let passes = ["levels", "samples", "quads", "bilateral"].map(|pass| of(&times, pass));
