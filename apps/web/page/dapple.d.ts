@@ -1,6 +1,5 @@
 // Types and documentation of dapple.js.
 
-/** How visibility is found: points through the atlas, points by the paper's look-up, or not at all. */
 /**
  * Methods that look at the picture alone: they need no server, no stream and no points. Those with `sd-` see hidden surfaces, too, by a stochastic depth map, which
  * WebGL2 cannot make (`stats.problem` says so, and the scene is drawn without occlusion).
@@ -8,6 +7,7 @@
 export type ScreenMethod =
   | "ssao" | "alchemy" | "sao" | "hbao" | "hbao-plus" | "gtao"
   | "sd-ssao" | "sd-hbao" | "sd-hbao-plus";
+/** How visibility is found: points through the atlas, points by the paper's look-up, from the picture alone, or not at all. */
 export type Method = "psao" | "psao-paper" | ScreenMethod | "none";
 
 /** What is shown. */
@@ -58,7 +58,7 @@ export interface Stats {
   time: number;
   duration: number;
   playing: boolean;
-  /** Why the chosen method cannot show the points, so that the scene is drawn without occlusion; null where it can. */
+  /** Why the chosen method cannot be shown, so that the scene is drawn without occlusion; null where it can. */
   problem: string | null;
   /** Of a live session; null without one. */
   live: LiveStatus | null;

@@ -270,7 +270,16 @@ fn the_handle_plays_seeks_and_steers() {
         }
         facts.differentViews = views.size;
         const methods = new Set();
-        for (const method of ['none', 'psao-paper', 'psao']) { viewer.setMethod(method); methods.add(await shown()); }
+        const screen = ['ssao', 'alchemy', 'sao', 'hbao', 'hbao-plus', 'gtao'];
+        facts.problems = [];
+        for (const method of ['none', ...screen, 'psao-paper', 'psao']) {
+          viewer.setMethod(method); methods.add(await shown());
+          if (viewer.stats.problem) facts.problems.push(method + ': ' + viewer.stats.problem);
+        }
+        viewer.setMethod('none'); const open = await shown();
+        viewer.setMethod('sd-hbao-plus'); facts.looksBehind = (await shown()) !== open;
+        facts.behind = viewer.stats.problem ?? '';
+        viewer.setMethod('psao');
         viewer.setSplit(0.3, 'none'); methods.add(await shown()); viewer.setSplit(null);
         facts.differentMethods = methods.size;
         return facts;";
@@ -286,7 +295,7 @@ fn the_handle_plays_seeks_and_steers() {
             })
         })
         .collect();
-    for report in drive(&tools, &folder, &pages, None) {
+    for (report, looks_behind) in drive(&tools, &folder, &pages, None).into_iter().zip([true, false]) {
         assert_quiet(&report);
         let facts = &report["done"][0]["result"];
         for fact in [
@@ -305,9 +314,15 @@ fn the_handle_plays_seeks_and_steers() {
         }
         assert_eq!(facts["duration"], 1.0);
         assert_eq!(facts["differentViews"], 8, "{report:#}");
-        assert_eq!(facts["differentMethods"], 4, "{report:#}");
+        assert_eq!(facts["differentMethods"], 10, "{report:#}");
+        assert_eq!(facts["problems"], json!([]), "{report:#}");
+        // Stochastic depth is what WebGL2 lacks.
+        let behind = facts["behind"].as_str().unwrap_or_default();
+        assert_eq!(facts["looksBehind"], looks_behind, "{report:#}");
+        assert_eq!(behind.contains("WebGL2"), !looks_behind, "{behind}");
         let refusal = |name: &str| facts[name].as_str().unwrap_or_default().to_owned();
-        assert_eq!(refusal("badMethod"), "there is no method \"magic\": choose from psao, psao-paper, none");
+        let known = "psao, psao-paper, ssao, alchemy, sao, hbao, hbao-plus, gtao, sd-ssao, sd-hbao, sd-hbao-plus, none";
+        assert_eq!(refusal("badMethod"), format!("there is no method \"magic\": choose from {known}"));
         assert!(refusal("badCamera").contains("there is no camera \"nowhere\""), "{report:#}");
         assert!(refusal("badPlace").contains("finite"), "{report:#}");
     }

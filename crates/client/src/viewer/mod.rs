@@ -232,7 +232,7 @@ impl Viewer {
             })
             .collect();
         let picture = screen::Picture { scene: &mut self.gpu_scene, pose: &pose, camera, size };
-        self.screen.draw(gpu, &mut encoder, &mut self.forward, picture, &on_screen, &options.screen)?;
+        self.screen.draw(gpu, &mut encoder, &mut self.forward, picture, &on_screen, &options.screen);
         // What a look-up cannot show is open.
         let lookup = |method| match self.standing_in(method, options) {
             Method::Screen(kind) => self.screen.lookup(kind),
@@ -289,7 +289,7 @@ impl Viewer {
     }
 
     /// Why a look-up that was drawn with cannot show the points that there are: too many for the device or for the look-up's
-    /// structure. `None` if all is well; another layout, or another viewer, may do better.
+    /// structure; or why the device cannot run a screen-space method. `None` if all is well.
     pub fn problem(&self) -> Option<&str> {
         self.light.problem().or(self.paper.problem()).or(self.screen.problem())
     }

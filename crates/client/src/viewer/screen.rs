@@ -2,7 +2,7 @@
 
 use dapple_gpu::{Gpu, wgpu};
 use dapple_render::Chosen;
-use dapple_render::forward::{Forward, ForwardError, GpuScene, LookupId};
+use dapple_render::forward::{Forward, GpuScene, LookupId};
 use dapple_render::gbuffer::GuardBand;
 use dapple_render::screen_space::{ScreenKind, ScreenPasses, ScreenView};
 use dapple_scene::{Pose, PosedCamera};
@@ -42,7 +42,7 @@ impl ScreenSpace {
         ScreenSpace { slots: [Slot::Unmade, Slot::Unmade], kinds: [None; 2], missing: None }
     }
 
-    /// Records the passes of the methods that a picture shows.
+    /// Records the passes of the methods that a picture shows. What cannot be shown is left out, and [`ScreenSpace::problem`] says why.
     pub(super) fn draw(
         &mut self,
         gpu: &Gpu,
@@ -51,7 +51,7 @@ impl ScreenSpace {
         picture: Picture<'_>,
         wanted: &[ScreenKind],
         options: &ScreenOptions,
-    ) -> Result<(), ForwardError> {
+    ) {
         (self.kinds, self.missing) = ([None; 2], None);
         let Picture { scene, pose, camera, size } = picture;
         let part = options.guard_band.clamp(0.0, GuardBand::MAX_PART);
@@ -73,7 +73,14 @@ impl ScreenSpace {
                     Err(error) => Slot::Failed(error.to_string()),
                 };
             }
-            let Slot::Made(passes) = slot else { continue };
+            let passes = match slot {
+                Slot::Made(passes) => passes,
+                Slot::Failed(problem) => {
+                    self.missing = Some(problem.clone());
+                    continue;
+                }
+                Slot::Unmade => continue,
+            };
             let view = ScreenView {
                 camera: *camera,
                 size,
@@ -81,10 +88,16 @@ impl ScreenSpace {
                 guard,
                 half_resolution: options.half_resolution.unwrap_or(half_resolution),
             };
-            passes.draw(gpu, encoder, forward, scene, pose, &view)?;
-            self.kinds[index] = Some(kind);
+            match passes.draw(gpu, encoder, forward, scene, pose, &view) {
+                Ok(()) => self.kinds[index] = Some(kind),
+                Err(error) => self.missing = Some(format!("{}: {error}", kind.name())),
+            }
         }
-        Ok(())
+        for (slot, kind) in self.slots.iter_mut().zip(self.kinds) {
+            if let (Slot::Made(passes), None) = (slot, kind) {
+                passes.release();
+            }
+        }
     }
 
     /// Where the forward pass finds what a method of the last [`ScreenSpace::draw`] has found.
@@ -93,12 +106,8 @@ impl ScreenSpace {
         index.map_or(LookupId::NONE, |index| IDS[index])
     }
 
-    /// Why a method cannot be shown, if so.
+    /// Why a method of the last picture is not shown, if so.
     pub(super) fn problem(&self) -> Option<&str> {
-        let failed = self.slots.iter().find_map(|slot| match slot {
-            Slot::Failed(problem) => Some(problem.as_str()),
-            _ => None,
-        });
-        failed.or(self.missing.as_deref())
+        self.missing.as_deref()
     }
 }

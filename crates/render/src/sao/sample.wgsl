@@ -86,8 +86,10 @@ fn sao_fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32
     let to_other = vec2(1.0) - 2.0 * vec2<f32>(at & vec2(1));
     // Half way to the other sample of the row, then of the column.
     let step_x = dpdxFine(value);
+    // Derivatives before anything branches, `&&` included.
+    let step_x_distance = dpdxFine(distance);
     let step_y_distance = dpdyFine(distance);
-    if pairs.x && abs(dpdxFine(distance)) < QUAD_EDGE_M {
+    if pairs.x && abs(step_x_distance) < QUAD_EDGE_M {
         value += 0.5 * to_other.x * step_x;
     }
     let step_y = dpdyFine(value);

@@ -6,7 +6,8 @@ mod method;
 mod passes;
 #[cfg(feature = "gpu")]
 mod plan;
-#[cfg(all(test, feature = "gpu"))]
+#[cfg(feature = "gpu")]
+#[cfg(test)]
 mod tests;
 #[cfg(feature = "gpu")]
 mod uniforms;

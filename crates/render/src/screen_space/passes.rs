@@ -13,21 +13,21 @@ use crate::forward::{
     LookupId,
 };
 use crate::gbuffer::GuardBand;
-use crate::sao::MAX_LEVELS;
 
 /// One screen-space method on a card: draws depths and normals of a view, runs the method over them, and lets the forward pass look the result up. Keeps what it makes
 /// from frame to frame.
 #[derive(Debug)]
 pub struct ScreenPasses {
     lookup: LookupId,
-    /// Of the picture, of a pass, and of the one that reads the stochastic map.
-    layouts: [wgpu::BindGroupLayout; 3],
+    /// Of the picture, of a pass, of the one that reads the stochastic map, and of the one that reads depths.
+    layouts: [wgpu::BindGroupLayout; 4],
     lookup_layout: wgpu::BindGroupLayout,
     pipelines: BTreeMap<(Shader, Image), wgpu::RenderPipeline>,
     /// What passes bind that write the distances themselves.
     blank: wgpu::TextureView,
     /// What methods bind that know nothing of hidden surfaces.
     nothing_hidden: wgpu::TextureView,
+    nearest: wgpu::Sampler,
     choice: Option<HiddenChoice>,
     /// Of the whole picture, and of half its resolution.
     screens: [wgpu::Buffer; 2],
@@ -116,6 +116,7 @@ impl ScreenPasses {
             layout(device, "screen", &[(0, UNIFORM), (1, TEXTURE), (2, TEXTURE)]),
             layout(device, "screen pass", &[(0, UNIFORM), (1, TEXTURE), (2, TEXTURES)]),
             layout(device, "stochastic map", &[(0, UNIFORM), (3, SAMPLED_DEPTHS)]),
+            layout(device, "depths", &[(0, UNIFORM), (1, TEXTURE), (4, NEAREST)]),
         ];
         Ok(ScreenPasses {
             lookup,
@@ -123,6 +124,7 @@ impl ScreenPasses {
             pipelines: BTreeMap::new(),
             blank: texture(gpu, Image::Distances(0).format(), (1, 1), 1).create_view(&Default::default()),
             nothing_hidden: array_view(&hidden_texture(gpu, (1, 1), 0)),
+            nearest: device.create_sampler(&wgpu::SamplerDescriptor::default()),
             choice: None,
             screens: [(); 2].map(|()| {
                 device.create_buffer(&wgpu::BufferDescriptor {
@@ -135,6 +137,11 @@ impl ScreenPasses {
             layouts,
             plan: None,
         })
+    }
+
+    /// Lets go of the textures of the last picture.
+    pub fn release(&mut self) {
+        self.plan = None;
     }
 
     /// Whether the device can run a method at all: some cannot draw stochastic depth maps.
@@ -151,7 +158,8 @@ impl ScreenPasses {
     }
 
     /// Records the method's passes for a picture and gives `forward` the result for its look-up. The view's camera and size, and the pose, must be those that the
-    /// picture is then drawn with. The geometry is drawn anew, with the guard band.
+    /// picture is then drawn with. The geometry is drawn anew, with the guard band. Once a submission, unless camera and size are the same: what a camera's passes read is
+    /// written before any of them runs.
     ///
     /// # Errors
     /// A parameter out of its range, or what [`Forward::draw_geometry`] refuses. Then nothing is recorded.
@@ -185,11 +193,19 @@ impl ScreenPasses {
         view: &ScreenView,
     ) -> Result<(), ForwardError> {
         view.method.check()?;
+        let mut view = *view;
+        if let (ScreenMethod::Sao(params), wgpu::Backend::Gl) =
+            (&mut view.method, gpu.adapter.get_info().backend)
+        {
+            // Of textures that are not filtered GLES 3 reads the first level alone.
+            params.levels = 0;
+        }
+        let view = &view;
         let largest = gpu.device.limits().max_texture_dimension_2d;
         let [width, height] = view.guarded();
-        // Levels halve what is made even first.
-        let room = largest.saturating_sub(1 << MAX_LEVELS);
-        if view.size.0 == 0 || view.size.1 == 0 || width.max(height) > room {
+        let padded = padded_size(&view.method, seen_size((width, height), view.half_resolution));
+        let widest = width.max(height).max(padded.0).max(padded.1);
+        if view.size.0 == 0 || view.size.1 == 0 || widest > largest {
             let reason = "the picture has no pixels, or with its guard band more than the device allows: make it smaller";
             return Err(ForwardError::Frame { reason });
         }
@@ -273,9 +289,7 @@ impl ScreenPasses {
         let full = (width, height);
         let seen = seen_size(full, view.half_resolution);
         let level_count = levels(&view.method, seen) + 1;
-        // The twin's levels are rounded up, a card's down: its first one is larger then, and passes write parts alone.
-        let whole = 1 << (level_count - 1);
-        let padded = (seen.0.next_multiple_of(whole), seen.1.next_multiple_of(whole));
+        let padded = padded_size(&view.method, seen);
         let distances = texture(gpu, Image::Distances(0).format(), padded, level_count);
         let picture = texture(gpu, Image::Picture.format(), view.size, 1);
         let size_of = |image| match image {
@@ -347,6 +361,11 @@ impl ScreenPasses {
             ];
             let passed = match shader {
                 Shader::Resolve => vec![(0, Resource::Uniform(&uniform)), (3, Resource::Texture(before))],
+                Shader::Distance => vec![
+                    (0, Resource::Uniform(&uniform)),
+                    (1, Resource::Texture(before)),
+                    (4, Resource::Sampler(&self.nearest)),
+                ],
                 _ => vec![
                     (0, Resource::Uniform(&uniform)),
                     (1, Resource::Texture(before)),
@@ -381,7 +400,11 @@ impl ScreenPasses {
 
     /// Layout of a pass's own group.
     fn pass_layout(&self, shader: Shader) -> &wgpu::BindGroupLayout {
-        if shader == Shader::Resolve { &self.layouts[2] } else { &self.layouts[1] }
+        match shader {
+            Shader::Resolve => &self.layouts[2],
+            Shader::Distance => &self.layouts[3],
+            _ => &self.layouts[1],
+        }
     }
 
     fn pipeline(&mut self, gpu: &Gpu, shader: Shader, writes: Image) -> wgpu::RenderPipeline {
@@ -443,6 +466,7 @@ const TEXTURE: wgpu::BindingType = wgpu::BindingType::Texture {
     multisampled: false,
 };
 
+const NEAREST: wgpu::BindingType = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering);
 const TEXTURES: wgpu::BindingType = wgpu::BindingType::Texture {
     sample_type: wgpu::TextureSampleType::Float { filterable: false },
     view_dimension: wgpu::TextureViewDimension::D2Array,
@@ -474,6 +498,7 @@ fn lookup_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
 
 enum Resource<'a> {
     Uniform(&'a wgpu::Buffer),
+    Sampler(&'a wgpu::Sampler),
     Texture(&'a wgpu::TextureView),
 }
 
@@ -488,6 +513,7 @@ fn group(
             binding: *binding,
             resource: match resource {
                 Resource::Uniform(buffer) => buffer.as_entire_binding(),
+                Resource::Sampler(sampler) => wgpu::BindingResource::Sampler(sampler),
                 Resource::Texture(view) => wgpu::BindingResource::TextureView(view),
             },
         })
@@ -495,11 +521,18 @@ fn group(
     device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
 }
 
-/// Distances of hidden surfaces, four a texel.
+/// Of the texture of distances. The twin's levels are rounded up, a card's down: its first one is larger then, and passes write parts alone.
+fn padded_size(method: &ScreenMethod, seen: (u32, u32)) -> (u32, u32) {
+    let whole = 1u32 << levels(method, seen);
+    let padded = |side: u32| side.checked_next_multiple_of(whole).unwrap_or(u32::MAX);
+    (padded(seen.0), padded(seen.1))
+}
+
+/// Distances of hidden surfaces, four a texel. Where there are none it has two layers: WebGL2 takes one for a plain texture.
 fn hidden_texture(gpu: &Gpu, (width, height): (u32, u32), layers: u32) -> wgpu::Texture {
     gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some("hidden"),
-        size: wgpu::Extent3d { width, height, depth_or_array_layers: layers.max(2) },
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: if layers == 0 { 2 } else { layers } },
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,

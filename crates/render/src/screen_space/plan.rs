@@ -43,14 +43,16 @@ pub(super) enum Shader {
 
 impl Shader {
     #[cfg(test)]
-    pub(super) const ALL: [Shader; 12] = [
+    pub(super) const ALL: [Shader; 14] = [
         Shader::Distance,
         Shader::Halve,
+        Shader::Resolve,
         Shader::Minify,
         Shader::Ssao,
         Shader::SsaoBlur,
         Shader::Alchemy,
         Shader::Sao { rotated: true },
+        Shader::Sao { rotated: false },
         Shader::Reconstruct,
         Shader::Hbao,
         Shader::Gtao,

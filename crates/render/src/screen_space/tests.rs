@@ -28,6 +28,9 @@ fn every_pass_is_valid_and_within_webgl2() {
     for shader in Shader::ALL {
         let (wgsl, entry) = shader.module();
         let module = validate(&wgsl).unwrap_or_else(|e| panic!("{shader:?}: {e}"));
+        // Browsers take derivatives only where all of a quad come, and `&&` is a branch.
+        let branched = |line: &str| line.contains("dpd") && (line.contains("&&") || line.contains("||"));
+        assert!(!wgsl.lines().any(branched), "{shader:?}");
         // Samples of depths are what WebGL2 cannot read.
         if shader == Shader::Resolve {
             continue;
@@ -290,5 +293,75 @@ fn tiny_pictures_and_guard_bands_are_drawn() {
                 }
             }
         }
+    }
+}
+
+/// Milliseconds of each pass on the adapter at hand, medians of runs in turn: `cargo test --release -p dapple-render --all-features
+/// screen_space::tests::times -- --ignored --nocapture`. Each pass is waited for, since a software adapter's own clock is wrong.
+#[test]
+#[ignore = "a measurement"]
+fn times() {
+    let glb = dapple_scene::builtin::glb("atrium", 0.5).unwrap();
+    let scene = dapple_scene::load("atrium.glb", &glb, &dapple_scene::NoFiles).unwrap();
+    let pose = scene.pose_undeformed(3.0);
+    let camera = scene.camera_paths()[0].camera(&scene, &pose);
+    let stage = Stage { scene, pose };
+    let Some(mut bench) = Bench::new(&stage) else { return };
+    eprintln!("{}", bench.gpu.adapter.get_info().name);
+    let kinds = ScreenKind::ALL.map(|kind| (kind.name().to_owned(), kind.method()));
+    table(&mut bench, &camera, (960, 540), &kinds);
+    for radius_m in [0.1, 0.5, 1.0, 3.0] {
+        let pair = [ScreenKind::Alchemy, ScreenKind::Sao]
+            .map(|kind| (format!("{} r = {radius_m}", kind.name()), kind.method().with_radius(radius_m)));
+        table(&mut bench, &camera, (1920, 1080), &pair);
+    }
+}
+
+fn table(bench: &mut Bench, camera: &PosedCamera, size: (u32, u32), methods: &[(String, ScreenMethod)]) {
+    const RUNS: usize = 5;
+    let guard = GuardBand::of_height(0.1, size.1).unwrap();
+    let mut all: Vec<Vec<(&'static str, Vec<f64>)>> = vec![Vec::new(); methods.len()];
+    for _ in 0..RUNS {
+        for ((_, method), times) in methods.iter().zip(&mut all) {
+            let view = ScreenView { camera: *camera, size, method: *method, guard, half_resolution: false };
+            let Bench { gpu, pose, scene, forward, passes } = &mut *bench;
+            let timed = |record: &mut dyn FnMut(&mut wgpu::CommandEncoder)| {
+                let mut encoder = gpu.device.create_command_encoder(&Default::default());
+                record(&mut encoder);
+                let start = std::time::Instant::now();
+                gpu.queue.submit([encoder.finish()]);
+                gpu.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
+                start.elapsed().as_secs_f64() * 1e3
+            };
+            let drawing = timed(&mut |encoder| {
+                passes.draw_geometry(gpu, encoder, forward, scene, pose, &view).unwrap();
+            });
+            let labels: Vec<&'static str> = passes.steps().collect();
+            let mut sums: Vec<(&'static str, f64)> = vec![("geometry", drawing)];
+            for (index, label) in labels.into_iter().enumerate() {
+                let ms = timed(&mut |encoder| passes.record_step(encoder, index));
+                match sums.iter_mut().find(|(known, _)| *known == label) {
+                    Some((_, sum)) => *sum += ms,
+                    None => sums.push((label, ms)),
+                }
+            }
+            times.resize_with(sums.len(), || ("", Vec::new()));
+            for ((label, list), (name, ms)) in times.iter_mut().zip(sums) {
+                *label = name;
+                list.push(ms);
+            }
+        }
+    }
+    for ((name, _), times) in methods.iter().zip(&mut all) {
+        let mut total = 0.0;
+        let passes: Vec<String> = times
+            .iter_mut()
+            .map(|(label, list)| {
+                list.sort_by(f64::total_cmp);
+                total += list[RUNS / 2];
+                format!("{label} {:.1}", list[RUNS / 2])
+            })
+            .collect();
+        eprintln!("{name} {size:?}: {} = {total:.1}", passes.join(", "));
     }
 }

@@ -6,9 +6,13 @@ struct DistanceParams {
 
 @group(1) @binding(0) var<uniform> params: DistanceParams;
 
+// WebGL2 reads a texture of depths only through a sampler that says nearest.
+@group(1) @binding(4) var nearest: sampler;
+
 @fragment
 fn distance_fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
-    let depth = textureLoad(before, vec2<i32>(position.xy), 0).r;
+    let place = position.xy / vec2<f32>(textureDimensions(before));
+    let depth = textureSampleLevel(before, nearest, place, 0.0).r;
     if depth <= 0.0 {
         return vec4(BACKGROUND_M);
     }

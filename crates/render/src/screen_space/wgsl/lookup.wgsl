@@ -4,6 +4,8 @@
 
 // Distances of one surface differ by no more than this part: sixteen bits, and what lies between a pixel's samples.
 const SAME_SURFACE: f32 = 0.004;
+// A neighbour that is farther away than this part speaks for another surface.
+const NEAR_SURFACE: f32 = 0.05;
 
 fn lookup_visibility(s: LookupInput) -> f32 {
     let last = vec2<i32>(textureDimensions(screen_visibility)) - 1;
@@ -21,5 +23,6 @@ fn lookup_visibility(s: LookupInput) -> f32 {
             best = vec2(texel.x, off);
         }
     }
-    return best.x;
+    // What is none of them, as glass before a wall, has no value.
+    return select(1.0, best.x, best.y <= NEAR_SURFACE * abs(s.distance));
 }
