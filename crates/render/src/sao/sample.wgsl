@@ -18,7 +18,10 @@ fn quad_normal(at: vec2<i32>) -> vec3<f32> {
     let size = vec2<i32>(screen.size);
     // The last of an odd row or column has no quad: its pair is the one before.
     let even = at & vec2(~1);
-    let first = select(max(even - 1, vec2(0)), even, (at | vec2(1)) < size);
+    // One by one: GLSL of WebGL2 cannot choose between vectors of integers.
+    let x = select(max(even.x - 1, 0), even.x, (at.x | 1) < size.x);
+    let y = select(max(even.y - 1, 0), even.y, (at.y | 1) < size.y);
+    let first = vec2(x, y);
     let right = difference(vec2(first.x, at.y), vec2(first.x + 1, at.y));
     let down = difference(vec2(at.x, first.y), vec2(at.x, first.y + 1));
     let along_row = select(vec3(1.0, 0.0, 0.0), right.xyz, right.w > 0.0);

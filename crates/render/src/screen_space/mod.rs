@@ -10,6 +10,8 @@ mod plan;
 #[cfg(test)]
 mod tests;
 #[cfg(feature = "gpu")]
+mod textures;
+#[cfg(feature = "gpu")]
 mod uniforms;
 
 pub use method::{Layered, ScreenKind, ScreenMethod, StochasticParams};

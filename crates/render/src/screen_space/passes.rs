@@ -7,6 +7,7 @@ use dapple_scene::{Pose, PosedCamera};
 
 use super::method::ScreenMethod;
 use super::plan::{Image, Pass, Shader, hidden_layers, level_size, levels, passes, seen_size};
+use super::textures::{array_view, can_draw_maps, hidden_texture, map_view, texture};
 use super::uniforms::ScreenUniform;
 use crate::forward::{
     Forward, ForwardError, GeometryTarget, GpuScene, HIDDEN_SAMPLES, HiddenChoice, HiddenTarget, Lookup,
@@ -526,74 +527,4 @@ fn padded_size(method: &ScreenMethod, seen: (u32, u32)) -> (u32, u32) {
     let whole = 1u32 << levels(method, seen);
     let padded = |side: u32| side.checked_next_multiple_of(whole).unwrap_or(u32::MAX);
     (padded(seen.0), padded(seen.1))
-}
-
-/// Distances of hidden surfaces, four a texel. Where there are none it has two layers: WebGL2 takes one for a plain texture.
-fn hidden_texture(gpu: &Gpu, (width, height): (u32, u32), layers: u32) -> wgpu::Texture {
-    gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("hidden"),
-        size: wgpu::Extent3d { width, height, depth_or_array_layers: if layers == 0 { 2 } else { layers } },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: Image::Hidden(0).format(),
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT
-            | wgpu::TextureUsages::TEXTURE_BINDING
-            | wgpu::TextureUsages::COPY_SRC,
-        view_formats: &[],
-    })
-}
-
-fn array_view(texture: &wgpu::Texture) -> wgpu::TextureView {
-    texture.create_view(&wgpu::TextureViewDescriptor {
-        dimension: Some(wgpu::TextureViewDimension::D2Array),
-        ..Default::default()
-    })
-}
-
-/// Depths in four samples a pixel.
-fn map_view(gpu: &Gpu, (width, height): (u32, u32)) -> wgpu::TextureView {
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("stochastic map"),
-        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: HIDDEN_SAMPLES,
-        dimension: wgpu::TextureDimension::D2,
-        format: Image::Map(0).format(),
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
-    });
-    texture.create_view(&wgpu::TextureViewDescriptor::default())
-}
-
-/// Whether the device can make a stochastic map.
-fn can_draw_maps(gpu: &Gpu) -> bool {
-    let features = |format| gpu.adapter.get_texture_format_features(format);
-    let depths = features(Image::Map(0).format());
-    let distances = features(Image::Hidden(0).format());
-    let flags = gpu.adapter.get_downlevel_capabilities().flags;
-    flags.contains(wgpu::DownlevelFlags::MULTISAMPLED_SHADING)
-        && depths.flags.sample_count_supported(HIDDEN_SAMPLES)
-        && depths.allowed_usages.contains(wgpu::TextureUsages::TEXTURE_BINDING)
-        && distances.allowed_usages.contains(wgpu::TextureUsages::RENDER_ATTACHMENT)
-}
-
-fn texture(
-    gpu: &Gpu,
-    format: wgpu::TextureFormat,
-    (width, height): (u32, u32),
-    mip_level_count: u32,
-) -> wgpu::Texture {
-    gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("screen"),
-        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        mip_level_count,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT
-            | wgpu::TextureUsages::TEXTURE_BINDING
-            | wgpu::TextureUsages::COPY_SRC,
-        view_formats: &[],
-    })
 }
