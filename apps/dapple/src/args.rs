@@ -17,7 +17,7 @@ use std::str::FromStr;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use dapple_scene::glam::Vec3;
 
-use crate::screen_space::{Layered, ScreenSpace, Stochastic};
+use crate::screen_space::ScreenSpace;
 
 pub(crate) use bake::BakeArgs;
 pub(crate) use bench::{Bench, BenchArgs, JoinArgs, ServedArgs, SoakArgs, ViewersArgs};
@@ -166,8 +166,9 @@ pub(crate) struct StepArgs {
 pub(crate) struct RenderArgs {
     #[command(flatten)]
     pub(crate) scene: SceneChoice,
-    /// Where visibility comes from.
-    #[arg(long, value_enum, default_value = "psao")]
+    /// Where visibility comes from: psao (points, by least squares), psao-hat (points, by the paper's kernel), rtao (rays at every sample: the truth),
+    /// a screen-space method as `dapple eval` names it (ssao, alchemy, sao, hbao, hbao-plus, gtao, sd-hbao-plus, hbao-plus-peeled and others), none.
+    #[arg(long, default_value = "psao")]
     pub(crate) method: RenderMethod,
     /// What is drawn.
     #[arg(long, value_enum, default_value = "beauty")]
@@ -244,7 +245,8 @@ pub(crate) struct SceneArgs {
     pub(crate) output: Option<PathBuf>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+/// A method as `render` names it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RenderMethod {
     /// Points, reconstructed by moving least squares.
     Psao,
@@ -252,57 +254,23 @@ pub(crate) enum RenderMethod {
     PsaoHat,
     /// Rays at every pixel: the truth.
     Rtao,
-    /// Screen space: random places in a hemisphere, the defaults of Falcor.
-    Ssao,
-    /// Screen space: AlchemyAO.
-    Alchemy,
-    /// Screen space, from depth alone: Scalable Ambient Obscurance.
-    Sao,
-    /// Screen space: horizons, HBAO.
-    Hbao,
-    /// Screen space: HBAO+.
-    HbaoPlus,
-    /// Screen space: GTAO with a visibility bitmask.
-    Gtao,
-    /// Screen space: SSAO over a stochastic depth map of 4 samples.
-    SdSsao,
-    /// Screen space: HBAO over a stochastic depth map of 4 samples.
-    SdHbao,
-    /// Screen space: HBAO+ over a stochastic depth map of 4 samples.
-    SdHbaoPlus,
-    /// The same over those of two cameras.
-    SdHbaoPlusMv,
-    /// Screen space: SSAO over all layers.
-    SsaoPeeled,
-    /// Screen space: HBAO over all layers.
-    HbaoPeeled,
-    /// Screen space: HBAO+ over all layers.
-    HbaoPlusPeeled,
-    /// No occlusion.
+    /// From the picture alone.
+    Screen(ScreenSpace),
     None,
 }
 
-impl RenderMethod {
-    /// Which screen-space method it is, if it is one.
-    pub(crate) fn screen_space(self) -> Option<ScreenSpace> {
-        let stochastic = |method| Some(ScreenSpace::Stochastic(method, Stochastic::DEFAULT));
-        match self {
-            RenderMethod::Ssao => Some(ScreenSpace::Ssao),
-            RenderMethod::Alchemy => Some(ScreenSpace::Alchemy),
-            RenderMethod::Sao => Some(ScreenSpace::Sao),
-            RenderMethod::Hbao => Some(ScreenSpace::Hbao),
-            RenderMethod::HbaoPlus => Some(ScreenSpace::HbaoPlus),
-            RenderMethod::Gtao => Some(ScreenSpace::Gtao),
-            RenderMethod::SdSsao => stochastic(Layered::Ssao),
-            RenderMethod::SdHbao => stochastic(Layered::Hbao),
-            RenderMethod::SdHbaoPlus => stochastic(Layered::HbaoPlus),
-            RenderMethod::SdHbaoPlusMv => {
-                Some(ScreenSpace::Stochastic(Layered::HbaoPlus, Stochastic::TWO_CAMERAS))
-            }
-            RenderMethod::SsaoPeeled => Some(ScreenSpace::Peeled(Layered::Ssao)),
-            RenderMethod::HbaoPeeled => Some(ScreenSpace::Peeled(Layered::Hbao)),
-            RenderMethod::HbaoPlusPeeled => Some(ScreenSpace::Peeled(Layered::HbaoPlus)),
-            RenderMethod::Psao | RenderMethod::PsaoHat | RenderMethod::Rtao | RenderMethod::None => None,
+impl FromStr for RenderMethod {
+    type Err = String;
+
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        match s {
+            "psao" => Ok(RenderMethod::Psao),
+            "psao-hat" => Ok(RenderMethod::PsaoHat),
+            "rtao" => Ok(RenderMethod::Rtao),
+            "none" => Ok(RenderMethod::None),
+            name => ScreenSpace::from_name(name)
+                .map(RenderMethod::Screen)
+                .ok_or_else(|| format!("known methods: psao, psao-hat, rtao, {}, none", ScreenSpace::KNOWN)),
         }
     }
 }
@@ -400,13 +368,12 @@ impl FromStr for Method {
                     (Some(rays @ 1..=65536), ..) => Ok(Method::Rtao { rays }),
                     (_, Some(radius), _) if (0.1..=8.0).contains(&radius) => Ok(Method::PsaoHat { radius }),
                     (.., Some(bias @ 1..=1024)) => Ok(Method::Sas { bias }),
-                    _ => Err(
+                    _ => Err(format!(
                         "known methods: psao, psao-mls, psao-hat, psao-hat-F with its radius times F from 0.1 to 8, \
-                              psao-paper, psao-paper-mls, sas-B with B from 1 to 1024, rtao-R with R from 1 to 65536 (rtao-16), ssao, alchemy, sao, hbao, hbao-plus, \
-                              gtao, sd-ssao, sd-hbao, sd-hbao-plus and these with -S for 1, 2, 4, 8 or 16 samples, sd-hbao-plus-mv, -paper \
-                              after any of them, ssao-peeled, hbao-peeled, hbao-plus-peeled, none"
-                            .into(),
-                    ),
+                         psao-paper, psao-paper-mls, sas-B with B from 1 to 1024, rtao-R with R from 1 to 65536 (rtao-16), \
+                         {}, none",
+                        ScreenSpace::KNOWN
+                    )),
                 }
             }
         }

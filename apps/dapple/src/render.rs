@@ -23,7 +23,7 @@ use crate::exr_file::{write_gray, write_rgb};
 use crate::light::{adaptive, publish};
 use crate::picture::{open_directions, sites, write_png};
 use crate::progress::Bar;
-use crate::screen_space::{ScreenSpace, Sight};
+use crate::screen_space::Sight;
 use crate::source::{self, Loaded};
 
 /// Renders what the arguments ask for and writes it.
@@ -139,10 +139,15 @@ fn check(args: &RenderArgs) -> Result<()> {
     if args.view == View::Points && is_exr(args) {
         bail!("--view points is a picture of discs: write it to a .png");
     }
-    let takes_bent = matches!(args.method, RenderMethod::Psao | RenderMethod::Rtao);
+    let takes_bent = match args.method {
+        RenderMethod::Psao | RenderMethod::Rtao => true,
+        RenderMethod::Screen(method) => method.can_bend(),
+        RenderMethod::PsaoHat | RenderMethod::None => false,
+    };
     if args.visibility.bent_normals && !takes_bent {
         bail!(
-            "--bent-normals changes pictures of --method psao and rtao alone: choose one of them, or leave it out"
+            "--bent-normals changes pictures of --method psao, rtao, hbao, hbao-plus and these two with hidden surfaces (as sd-hbao-plus) alone: \
+             choose one of them, or leave it out"
         );
     }
     if !args.time.is_finite() {
@@ -161,28 +166,49 @@ fn open(drawn: &Drawn) -> Vec<f32> {
 }
 
 /// The picture before tone mapping. With bent normals ambient light is gathered from where it comes: from about those of the points, or, by
-/// rays, from the directions that they find open.
+/// rays and by horizons, from the directions that they find open.
 fn radiance(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn, camera: &PosedCamera) -> Result<LinearImage> {
-    let (scene, shade) = (&loaded.scene, ShadeParams::default());
     let bent = args.visibility.bent_normals;
     match args.method {
         RenderMethod::Psao if bent => {
             let (_, client) = light(args, loaded)?;
             let visibility = client.visibility(drawn, &Reconstruction::Atlas);
-            let ambient = client.ambient(drawn, camera, &shade, &visibility);
+            let ambient = client.ambient(drawn, camera, &ShadeParams::default(), &visibility);
             Ok(drawn.compose_with(ambient.as_deref(), Some(&visibility))?)
         }
         RenderMethod::Rtao if bent => {
             let visibility = traced(args, loaded, drawn)?;
-            let (indices, sites) = sites(scene, drawn);
-            let tracer = Tracer::new(scene, &drawn.pose);
+            let (indices, sites) = sites(&loaded.scene, drawn);
+            let tracer = Tracer::new(&loaded.scene, &drawn.pose);
             let open_world = open_directions(drawn, &tracer, (&indices, &sites), &rtao(args, loaded)?);
-            let gathering = Gathering { visibility: &visibility, openings: Openings::Traced(&open_world) };
-            let ambient = shade_gathered(scene, &drawn.pose, camera, &drawn.gbuffer, &shade, gathering);
+            let ambient = gathered(loaded, drawn, camera, &visibility, &open_world);
+            Ok(drawn.compose_with(Some(&ambient), Some(&visibility))?)
+        }
+        RenderMethod::Screen(method) if bent => {
+            let (sight, effort) = (sight(args, loaded, drawn, camera)?, args.effort.effort());
+            let Some((open, open_world)) = method.bent(&sight, effort)? else {
+                bail!("{} has no bent normals", method.name())
+            };
+            // How much light comes is what it is without bent normals; they say from where.
+            let ambient = gathered(loaded, drawn, camera, &open, &open_world);
+            let visibility = method.estimate(&sight, effort)?.visibility;
             Ok(drawn.compose_with(Some(&ambient), Some(&visibility))?)
         }
         method => Ok(drawn.compose(visibility(args, method, loaded, drawn, camera)?.as_deref())?),
     }
+}
+
+/// Ambient light of samples from where they are open, as if all of it came.
+fn gathered(
+    loaded: &Loaded,
+    drawn: &Drawn,
+    camera: &PosedCamera,
+    visibility: &[f32],
+    open_world: &[Vec3],
+) -> Vec<Vec3> {
+    let gathering = Gathering { visibility, openings: Openings::Traced(open_world) };
+    let shade = ShadeParams::default();
+    shade_gathered(&loaded.scene, &drawn.pose, camera, &drawn.gbuffer, &shade, gathering)
 }
 
 /// One visibility a sample; `None` for no occlusion.
@@ -197,10 +223,11 @@ fn visibility(
         RenderMethod::None => return Ok(None),
         RenderMethod::Rtao => return Ok(Some(traced(args, loaded, drawn)?)),
         RenderMethod::PsaoHat => Kernel::Hat(Hat::default()).into(),
-        method => match method.screen_space() {
-            Some(method) => return Ok(Some(screen_space(args, method, loaded, drawn, camera)?)),
-            None => Reconstruction::Atlas,
-        },
+        RenderMethod::Screen(method) => {
+            let sight = sight(args, loaded, drawn, camera)?;
+            return Ok(Some(method.estimate(&sight, args.effort.effort())?.visibility));
+        }
+        RenderMethod::Psao => Reconstruction::Atlas,
     };
     let (_, client) = light(args, loaded)?;
     Ok(Some(client.visibility(drawn, &reconstruction)))
@@ -227,17 +254,16 @@ fn traced(args: &RenderArgs, loaded: &Loaded, drawn: &Drawn) -> Result<Vec<f32>>
     Ok(visibility)
 }
 
-fn screen_space(
+/// What screen-space methods look at.
+fn sight<'a>(
     args: &RenderArgs,
-    method: ScreenSpace,
-    loaded: &Loaded,
-    drawn: &Drawn,
-    camera: &PosedCamera,
-) -> Result<Vec<f32>> {
+    loaded: &'a Loaded,
+    drawn: &'a Drawn,
+    camera: &'a PosedCamera,
+) -> Result<Sight<'a>> {
     let (radius_m, _) = source::resolve_radius(&loaded.scene, &args.visibility)?;
     let (scene, pose, gbuffer) = (&*loaded.scene, &drawn.pose, &drawn.gbuffer);
-    let sight = Sight { scene, pose, camera, gbuffer, radius_m, seed: args.visibility.seed };
-    Ok(method.estimate(&sight, args.effort.effort())?.visibility)
+    Ok(Sight { scene, pose, camera, gbuffer, radius_m, seed: args.visibility.seed })
 }
 
 /// A server brought to the picture's time, and a client that has joined it.

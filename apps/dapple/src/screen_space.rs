@@ -4,10 +4,12 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use dapple_render::gbuffer::{GBuffer, GuardBand, Layers, Screen};
+use dapple_render::screen_space::{ScreenKind, ScreenMethod};
 use dapple_render::sdao::{
-    Lookup, MapParams, SideParams, SideView, StochasticMap, estimate_visibility_of_two,
+    Lookup, MapParams, SideParams, SideView, StochasticMap, bent_normals, estimate_visibility_of_two,
 };
-use dapple_render::{AfterPass, Chosen, Preset, RenderError, alchemy, gtao, hbao, sao, ssao, upsample};
+use dapple_render::{AfterPass, Chosen, Preset, RenderError, upsample};
+use dapple_scene::glam::Vec3;
 use dapple_scene::{Pose, PosedCamera, Scene};
 
 /// Which of them.
@@ -72,46 +74,35 @@ impl Layered {
     }
 
     pub(crate) fn name(self) -> &'static str {
-        match self {
-            Layered::Ssao => "ssao",
-            Layered::Hbao => "hbao",
-            Layered::HbaoPlus => "hbao-plus",
-        }
-    }
-
-    /// Parameters of HBAO or HBAO+, and whether they are meant for half the resolution.
-    fn hbao(self, preset: Preset, radius_m: f32) -> Chosen<hbao::HbaoParams> {
-        let Chosen { params, half_resolution } = match self {
-            Layered::Hbao => preset.hbao(),
-            Layered::Ssao | Layered::HbaoPlus => preset.hbao_plus(),
-        };
-        Chosen { params: hbao::HbaoParams { radius_m, ..params }, half_resolution }
+        self.single().kind().name()
     }
 }
 
 /// What is known of hidden surfaces.
-enum Known {
-    Nothing,
-    Map(StochasticMap),
-    Layers(Layers),
+#[derive(Default)]
+struct Known {
+    map: Option<StochasticMap>,
+    /// Of a second camera.
+    side: Option<SideView>,
+    layers: Option<Layers>,
+    is_paper: bool,
 }
 
 impl Known {
-    fn lookup(&self, is_paper: bool) -> Lookup<'_> {
-        match self {
-            Known::Nothing => Lookup::default(),
-            Known::Map(map) if is_paper => Lookup::paper(map),
-            Known::Map(map) => Lookup::stochastic(map),
-            Known::Layers(layers) => Lookup::peeled(layers),
-        }
+    fn lookup(&self, compensation: f32) -> Lookup<'_> {
+        let lookup = match (&self.map, &self.layers) {
+            (Some(map), _) if self.is_paper => Lookup::paper(map),
+            (Some(map), _) => Lookup::stochastic(map),
+            (None, Some(layers)) => Lookup::peeled(layers),
+            (None, None) => Lookup::default(),
+        };
+        Lookup { compensation, ..lookup }
     }
 
-    fn half(&self) -> Known {
-        match self {
-            Known::Nothing => Known::Nothing,
-            Known::Map(map) => Known::Map(map.half()),
-            Known::Layers(layers) => Known::Layers(layers.half()),
-        }
+    /// Of the samples of [`Screen::half`]; the second camera's picture has its own.
+    fn half(self) -> Known {
+        let (map, layers) = (self.map.map(|map| map.half()), self.layers.map(|layers| layers.half()));
+        Known { map, layers, ..self }
     }
 }
 
@@ -183,6 +174,10 @@ impl ScreenSpace {
         ScreenSpace::Peeled(Layered::HbaoPlus),
     ];
 
+    /// What names there are, for messages.
+    pub(crate) const KNOWN: &str = "ssao, alchemy, sao, hbao, hbao-plus, gtao, sd-ssao, sd-hbao, sd-hbao-plus and these with -S for 1, 2, 4, \
+                                    8 or 16 samples, sd-hbao-plus-mv, -paper after any of them, ssao-peeled, hbao-peeled, hbao-plus-peeled";
+
     /// By the name that `eval` and `render` give it.
     pub(crate) fn from_name(name: &str) -> Option<ScreenSpace> {
         if let Some(plain) = ScreenSpace::ALL.into_iter().find(|method| method.name() == name) {
@@ -206,12 +201,6 @@ impl ScreenSpace {
     /// As `eval` and `render` name it.
     pub(crate) fn name(self) -> String {
         match self {
-            ScreenSpace::Ssao => "ssao".into(),
-            ScreenSpace::Alchemy => "alchemy".into(),
-            ScreenSpace::Sao => "sao".into(),
-            ScreenSpace::Hbao => "hbao".into(),
-            ScreenSpace::HbaoPlus => "hbao-plus".into(),
-            ScreenSpace::Gtao => "gtao".into(),
             ScreenSpace::Stochastic(method, Stochastic { samples, two_cameras, paper }) => {
                 let samples = match samples {
                     4 => String::new(),
@@ -222,29 +211,63 @@ impl ScreenSpace {
                 format!("sd-{}{samples}{two_cameras}{paper}", method.name())
             }
             ScreenSpace::Peeled(method) => format!("{}-peeled", method.name()),
+            single => single.kind().name().to_owned(),
+        }
+    }
+
+    /// The method, whatever it knows of hidden surfaces.
+    fn kind(self) -> ScreenKind {
+        match self {
+            ScreenSpace::Ssao => ScreenKind::Ssao,
+            ScreenSpace::Alchemy => ScreenKind::Alchemy,
+            ScreenSpace::Sao => ScreenKind::Sao,
+            ScreenSpace::Hbao => ScreenKind::Hbao,
+            ScreenSpace::HbaoPlus => ScreenKind::HbaoPlus,
+            ScreenSpace::Gtao => ScreenKind::Gtao,
+            ScreenSpace::Stochastic(method, _) | ScreenSpace::Peeled(method) => method.single().kind(),
         }
     }
 
     /// Visibility of a picture, with its guard band and at the resolution that is asked for.
     pub(crate) fn estimate(self, sight: &Sight<'_>, effort: Effort) -> Result<Estimate> {
-        let Sight { scene, pose, camera, gbuffer, .. } = *sight;
-        let size = [gbuffer.width, gbuffer.height];
-        let band = GuardBand::of_height(effort.guard_band, gbuffer.height)?;
         let start = Instant::now();
-        if band.pixels() == 0 {
-            let screen = gbuffer.screen(scene, pose, camera)?;
-            let visibility = self.on_screen(&screen, sight, effort, &mut |_| ())?;
-            return Ok(Estimate { visibility, time: start.elapsed() });
-        }
-        let wide = band.rasterize(scene, pose, camera, size, gbuffer.samples_per_axis)?;
-        let drawing = start.elapsed();
-        let wide_camera = band.camera(camera, gbuffer.height);
-        let screen = wide.screen(scene, pose, &wide_camera)?;
-        let wide_sight = Sight { gbuffer: &wide, camera: &wide_camera, ..*sight };
-        let visibility = self.on_screen(&screen, &wide_sight, effort, &mut |_| ())?;
-        let visibility = band.crop(&visibility, size, gbuffer.samples_per_axis)?;
-        let of_picture = drawing.mul_f64(1.0 - band.part(size));
-        Ok(Estimate { visibility, time: start.elapsed() - of_picture })
+        let beyond = sight.beyond(effort.guard_band, |screen, sight| {
+            Ok(self.on_screen(screen, sight, effort, &mut |_| ())?)
+        })?;
+        let visibility = beyond.crop(sight, &beyond.found)?;
+        Ok(Estimate { visibility, time: start.elapsed() - beyond.of_picture })
+    }
+
+    /// How much around each sample of a picture is open, and where, in the world, by HBAO or HBAO+ with what they know of hidden surfaces; `None` of other methods, and
+    /// of two cameras.
+    pub(crate) fn bent(self, sight: &Sight<'_>, effort: Effort) -> Result<Option<(Vec<f32>, Vec<Vec3>)>> {
+        let params = match self.method(sight, effort.preset).params {
+            ScreenMethod::Hbao(params) if !self.has_two_cameras() => params,
+            _ => return Ok(None),
+        };
+        let beyond = sight.beyond(effort.guard_band, |screen, sight| {
+            let known = self.known(screen, sight, effort, false, &mut |_| ())?;
+            let bent = bent_normals(screen, &params, &known.lookup(effort.compensation))?;
+            let open_world = bent.open_world(sight.camera);
+            Ok((bent.visibility, open_world))
+        })?;
+        let (visibility, open_world) = &beyond.found;
+        Ok(Some((beyond.crop(sight, visibility)?, beyond.crop(sight, open_world)?)))
+    }
+
+    /// Whether [`ScreenSpace::bent`] is there.
+    pub(crate) fn can_bend(self) -> bool {
+        matches!(self.kind(), ScreenKind::Hbao | ScreenKind::HbaoPlus) && !self.has_two_cameras()
+    }
+
+    fn has_two_cameras(self) -> bool {
+        matches!(self, ScreenSpace::Stochastic(_, Stochastic { two_cameras: true, .. }))
+    }
+
+    /// With a preset's parameters, and the resolution that they are meant for.
+    fn method(self, sight: &Sight<'_>, preset: Preset) -> Chosen<ScreenMethod> {
+        let Chosen { params, half_resolution } = self.kind().preset(preset);
+        Chosen { params: params.with_radius(sight.radius_m).with_seed(sight.seed), half_resolution }
     }
 
     /// Visibility of each sample of what is seen, which is that of `sight`'s picture and camera; `after` is told the name of each pass.
@@ -255,120 +278,95 @@ impl ScreenSpace {
         effort: Effort,
         after: AfterPass<'_>,
     ) -> Result<Vec<f32>, RenderError> {
-        let (preset, radius_m) = (effort.preset, sight.radius_m);
-        let half = |of_preset: bool| effort.half_resolution.unwrap_or(of_preset);
+        let Chosen { params: method, half_resolution } = self.method(sight, effort.preset);
+        let half_resolution = effort.half_resolution.unwrap_or(half_resolution);
+        let known = self.known(screen, sight, effort, half_resolution, after)?;
+        let known = if half_resolution { known.half() } else { known };
+        let lookup = known.lookup(effort.compensation);
+        let run = |screen: &Screen, after: AfterPass<'_>| match (&method, &known.side) {
+            (ScreenMethod::Hbao(params), Some(side)) => {
+                estimate_visibility_of_two(screen, params, &lookup, side, after)
+            }
+            _ => method.estimate_by_passes(screen, &lookup, after),
+        };
+        if half_resolution { upsample::at_half_resolution(screen, after, run) } else { run(screen, after) }
+    }
+
+    /// Draws the hidden surfaces that the method looks at.
+    fn known(
+        self,
+        screen: &Screen,
+        sight: &Sight<'_>,
+        effort: Effort,
+        half_resolution: bool,
+        after: AfterPass<'_>,
+    ) -> Result<Known, RenderError> {
+        let Sight { scene, pose, camera, gbuffer, seed, .. } = *sight;
         match self {
-            ScreenSpace::Alchemy => {
-                let Chosen { params, half_resolution } = preset.alchemy();
-                let params = alchemy::AlchemyParams { radius_m, ..params };
-                let run = |s: &Screen, after: AfterPass<'_>| alchemy::estimate_by_passes(s, &params, after);
-                at(screen, half(half_resolution), run, after)
+            ScreenSpace::Stochastic(_, stochastic) => {
+                let params = MapParams { seed, ..stochastic.map() };
+                let map = StochasticMap::draw(scene, pose, camera, gbuffer, &params)?;
+                after("map");
+                let mut known = Known { map: Some(map), is_paper: stochastic.paper, ..Known::default() };
+                if stochastic.two_cameras {
+                    let size = [screen.columns(), screen.rows()];
+                    // As coarse as the first.
+                    let coarseness = effort.second_coarseness * if half_resolution { 2 } else { 1 };
+                    let second = SideParams { coarseness, ..SideParams::default() };
+                    known.side = Some(SideView::draw(scene, pose, camera, size, &second, &params)?);
+                    after("second map");
+                }
+                Ok(known)
             }
-            ScreenSpace::Sao => {
-                let Chosen { params, half_resolution } = preset.sao();
-                let params = sao::SaoParams { radius_m, ..params };
-                let run = |s: &Screen, after: AfterPass<'_>| sao::estimate_by_passes(s, &params, after);
-                at(screen, half(half_resolution), run, after)
+            ScreenSpace::Peeled(_) => {
+                let [width, height, n] = [gbuffer.width, gbuffer.height, gbuffer.samples_per_axis];
+                let layers = Layers::draw(scene, pose, camera, width, height, n)?;
+                after("layers");
+                Ok(Known { layers: Some(layers), ..Known::default() })
             }
-            ScreenSpace::Gtao => {
-                let Chosen { params, half_resolution } = preset.gtao();
-                let params = gtao::GtaoParams { radius_m, ..params };
-                let run = |s: &Screen, after: AfterPass<'_>| gtao::estimate_by_passes(s, &params, after);
-                at(screen, half(half_resolution), run, after)
-            }
-            ScreenSpace::Ssao => layered(Layered::Ssao, screen, sight, effort, None, after),
-            ScreenSpace::Hbao => layered(Layered::Hbao, screen, sight, effort, None, after),
-            ScreenSpace::HbaoPlus => layered(Layered::HbaoPlus, screen, sight, effort, None, after),
-            ScreenSpace::Stochastic(method, stochastic) => {
-                layered(method, screen, sight, effort, Some(Depths::Some(stochastic)), after)
-            }
-            ScreenSpace::Peeled(method) => layered(method, screen, sight, effort, Some(Depths::All), after),
+            _ => Ok(Known::default()),
         }
     }
 }
 
-/// Which hidden surfaces are drawn.
-#[derive(Clone, Copy)]
-enum Depths {
-    Some(Stochastic),
-    All,
+/// What was found in a picture with its guard band.
+struct Beyond<T> {
+    found: T,
+    band: GuardBand,
+    /// Of drawing, the picture's own part: a client draws that anyway.
+    of_picture: Duration,
 }
 
-/// Runs a method that can look behind the first surface.
-fn layered(
-    method: Layered,
-    screen: &Screen,
-    sight: &Sight<'_>,
-    effort: Effort,
-    depths: Option<Depths>,
-    after: AfterPass<'_>,
-) -> Result<Vec<f32>, RenderError> {
-    let Sight { scene, pose, camera, gbuffer, radius_m, seed } = *sight;
-    let preset = effort.preset;
-    let of_preset = match method {
-        Layered::Ssao => preset.ssao().half_resolution,
-        _ => method.hbao(preset, radius_m).half_resolution,
-    };
-    let half_resolution = effort.half_resolution.unwrap_or(of_preset);
-    let (mut is_paper, mut side) = (false, None);
-    let known = match depths {
-        None => Known::Nothing,
-        Some(Depths::Some(stochastic)) => {
-            is_paper = stochastic.paper;
-            let params = MapParams { seed, ..stochastic.map() };
-            let map = StochasticMap::draw(scene, pose, camera, gbuffer, &params)?;
-            after("map");
-            if stochastic.two_cameras {
-                let size = [screen.columns(), screen.rows()];
-                // As coarse as the first.
-                let coarseness = effort.second_coarseness * if half_resolution { 2 } else { 1 };
-                let second = SideParams { coarseness, ..SideParams::default() };
-                side = Some(SideView::draw(scene, pose, camera, size, &second, &params)?);
-                after("second map");
-            }
-            Known::Map(map)
-        }
-        Some(Depths::All) => {
-            let [width, height, n] = [gbuffer.width, gbuffer.height, gbuffer.samples_per_axis];
-            let layers = Layers::draw(scene, pose, camera, width, height, n)?;
-            after("layers");
-            Known::Layers(layers)
-        }
-    };
-    let known = if half_resolution { known.half() } else { known };
-    let lookup = Lookup { compensation: effort.compensation, ..known.lookup(is_paper) };
-    let run = |screen: &Screen, after: AfterPass<'_>| match (method, &side) {
-        (Layered::Ssao, _) => {
-            let params = ssao::SsaoParams { radius_m, seed, ..preset.ssao().params };
-            ssao::estimate_by_passes(screen, &params, &lookup, after)
-        }
-        (_, None) => hbao::estimate_by_passes(screen, &method.hbao(preset, radius_m).params, &lookup, after),
-        (_, Some(side)) => {
-            let params = method.hbao(preset, radius_m).params;
-            let visibility = estimate_visibility_of_two(screen, &params, &lookup, side)?;
-            after("samples");
-            Ok(visibility)
-        }
-    };
-    at(screen, half_resolution, run, after)
-}
-
-/// Runs a method on all samples, or on a quarter of them and upsamples.
-fn at(
-    screen: &Screen,
-    half_resolution: bool,
-    run: impl Fn(&Screen, AfterPass<'_>) -> Result<Vec<f32>, RenderError>,
-    after: AfterPass<'_>,
-) -> Result<Vec<f32>, RenderError> {
-    if !half_resolution {
-        return run(screen, after);
+impl<T> Beyond<T> {
+    /// Of one value a sample those of the picture.
+    fn crop<V: Copy>(&self, sight: &Sight<'_>, values: &[V]) -> Result<Vec<V>, RenderError> {
+        let gbuffer = sight.gbuffer;
+        self.band.crop(values, [gbuffer.width, gbuffer.height], gbuffer.samples_per_axis)
     }
-    let half = screen.half();
-    after("half");
-    let values = run(&half, after)?;
-    let visibility = upsample::upsample(screen, &half, &values)?;
-    after("upsampling");
-    Ok(visibility)
+}
+
+impl Sight<'_> {
+    /// Lets `look` see the picture with a guard band that is a part of its height wide.
+    fn beyond<T>(
+        &self,
+        guard_band: f32,
+        look: impl FnOnce(&Screen, &Sight<'_>) -> Result<T>,
+    ) -> Result<Beyond<T>> {
+        let Sight { scene, pose, camera, gbuffer, .. } = *self;
+        let size = [gbuffer.width, gbuffer.height];
+        let band = GuardBand::of_height(guard_band, gbuffer.height)?.within(size, gbuffer.samples_per_axis);
+        if band.pixels() == 0 {
+            let screen = gbuffer.screen(scene, pose, camera)?;
+            return Ok(Beyond { found: look(&screen, self)?, band, of_picture: Duration::ZERO });
+        }
+        let start = Instant::now();
+        let wide = band.rasterize(scene, pose, camera, size, gbuffer.samples_per_axis)?;
+        let of_picture = start.elapsed().mul_f64(1.0 - band.part(size));
+        let camera = band.camera(camera, gbuffer.height);
+        let screen = wide.screen(scene, pose, &camera)?;
+        let found = look(&screen, &Sight { gbuffer: &wide, camera: &camera, ..*self })?;
+        Ok(Beyond { found, band, of_picture })
+    }
 }
 
 #[cfg(test)]
@@ -425,6 +423,14 @@ mod tests {
                 assert_eq!(values.len(), 64 * 36, "{method:?}, {i}");
                 assert!(values.iter().all(|v| (0.0..=1.0).contains(v)), "{method:?}, {i}");
                 assert!(all[..i].iter().all(|other| other != values), "{method:?}, {i} is like another");
+            }
+            let bent = method.bent(&sight, Effort::default()).unwrap();
+            assert_eq!(bent.is_some(), method.can_bend(), "{method:?}");
+            if let Some((open, open_world)) = bent {
+                assert_eq!([open.len(), open_world.len()], [64 * 36; 2]);
+                // No more than the whole hemisphere, and some of it where anything is open.
+                let lengths = open_world.iter().zip(gbuffer.samples()).filter(|(_, s)| s.is_covered());
+                assert!(lengths.into_iter().all(|(d, _)| (0.0..0.67).contains(&d.length())), "{method:?}");
             }
             let half_said = Effort { half_resolution: Some(false), preset: Preset::Medium, ..plain };
             assert_ne!(of(half_said), of(Effort { half_resolution: None, ..half_said }));

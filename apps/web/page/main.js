@@ -7,6 +7,8 @@ const byId = (id) => document.getElementById(id);
 const [canvas, ui, loading, stage, bar, message] = ["view", "ui", "loading", "stage", "progress", "message"].map(byId);
 const [play, slider, clock, menu, divider] = ["play", "time", "clock", "menu", "divider"].map(byId);
 const [method, other, what, camera] = ["method", "other", "what", "camera"].map(byId);
+// What can be shown can be compared with.
+other.append(...[...method.options].map((option) => option.cloneNode(true)));
 const narrow = matchMedia("(max-width: 640px)");
 
 const STAGES = {

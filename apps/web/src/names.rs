@@ -38,57 +38,20 @@ impl std::error::Error for UnknownName {}
 const BACKENDS: [(&str, Backend); 3] =
     [("auto", Backend::Auto), ("webgpu", Backend::WebGpu), ("webgl2", Backend::WebGl2)];
 
-const METHODS: [(&str, Method); 12] = [
-    ("psao", Method::Psao),
-    ("psao-paper", Method::PsaoPaper),
-    screen(ScreenKind::Ssao),
-    screen(ScreenKind::Alchemy),
-    screen(ScreenKind::Sao),
-    screen(ScreenKind::Hbao),
-    screen(ScreenKind::HbaoPlus),
-    screen(ScreenKind::Gtao),
-    screen(ScreenKind::SdSsao),
-    screen(ScreenKind::SdHbao),
-    screen(ScreenKind::SdHbaoPlus),
-    ("none", Method::None),
-];
-
-const fn screen(kind: ScreenKind) -> (&'static str, Method) {
-    (kind.name(), Method::Screen(kind))
-}
-
-const VIEWS: [(&str, DebugView); 8] = [
-    ("beauty", DebugView::Beauty),
-    ("visibility", DebugView::Visibility),
-    ("normal", DebugView::Normal),
-    ("points", DebugView::Points),
-    ("texels", DebugView::Texels),
-    ("weights", DebugView::Weights),
-    ("age", DebugView::Age),
-    ("error", DebugView::Error),
-];
-
 /// The backend of that name: `auto`, `webgpu`, `webgl2`.
 pub fn backend(name: &str) -> Result<Backend, UnknownName> {
     find(&BACKENDS, "backend", name)
 }
 
-/// The method of that name: `psao`, `psao-paper`, `ssao`, `alchemy`, `sao`, `hbao`, `hbao-plus`, `gtao`, `sd-ssao`, `sd-hbao`, `sd-hbao-plus`, `none`.
+/// The method of that [name](Method::name).
 pub fn method(name: &str) -> Result<Method, UnknownName> {
-    find(&METHODS, "method", name)
+    find(&Method::ALL.map(|method| (method.name(), method)), "method", name)
 }
 
 /// What stands in for points, by the name of a method of screen space; `none` for nothing.
 pub fn fallback(name: &str) -> Result<Option<ScreenKind>, UnknownName> {
-    match METHODS.iter().find(|(known, _)| *known == name) {
-        Some((_, Method::Screen(kind))) => Ok(Some(*kind)),
-        Some((_, Method::None)) => Ok(None),
-        _ => {
-            let names = ScreenKind::ALL.map(ScreenKind::name);
-            let known = names.into_iter().chain(["none"]).collect::<Vec<_>>().join(", ");
-            Err(UnknownName { what: "fallback", found: name.to_owned(), known })
-        }
-    }
+    let kinds = ScreenKind::ALL.into_iter().map(|kind| (kind.name(), Some(kind)));
+    find(&kinds.chain([("none", None)]).collect::<Vec<_>>(), "fallback", name)
 }
 
 /// The amount of work of that name: `low`, `medium`, `high`, `ultra`.
@@ -96,9 +59,9 @@ pub fn effort(name: &str) -> Result<Preset, UnknownName> {
     find(&Preset::ALL.map(|preset| (preset.name(), preset)), "aoPreset", name)
 }
 
-/// The view of that name: `beauty`, `visibility`, `normal`, `points`, `texels`, `weights`, `age`, `error`.
+/// The view of that [name](DebugView::name).
 pub fn view(name: &str) -> Result<DebugView, UnknownName> {
-    find(&VIEWS, "view", name)
+    find(&DebugView::ALL.map(|view| (view.name(), view)), "view", name)
 }
 
 fn find<T: Copy>(table: &[(&str, T)], what: &'static str, name: &str) -> Result<T, UnknownName> {

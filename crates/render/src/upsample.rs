@@ -5,8 +5,8 @@
 
 use glam::Vec3;
 
-use crate::RenderError;
 use crate::gbuffer::Screen;
+use crate::{AfterPass, RenderError};
 
 /// How far a sample may lie from another's plane before it counts nothing, in widths of a sample at that distance.
 const TOLERANCE_SAMPLES: f32 = 2.0;
@@ -29,16 +29,21 @@ pub fn upsample(full: &Screen, half: &Screen, values: &[f32]) -> Result<Vec<f32>
     Ok(full.map(|at| value_at(full, half, values, at)))
 }
 
-/// Estimates at half resolution and upsamples.
+/// Estimates at half resolution and upsamples; `after` is told the names of the passes, `half` and `upsampling` among them.
 ///
 /// # Errors
 /// What `estimate` fails with, or a list of another length than there are samples.
 pub fn at_half_resolution(
     screen: &Screen,
-    estimate: impl FnOnce(&Screen) -> Result<Vec<f32>, RenderError>,
+    after: AfterPass<'_>,
+    estimate: impl FnOnce(&Screen, AfterPass<'_>) -> Result<Vec<f32>, RenderError>,
 ) -> Result<Vec<f32>, RenderError> {
     let half = screen.half();
-    upsample(screen, &half, &estimate(&half)?)
+    after("half");
+    let values = estimate(&half, after)?;
+    let visibility = upsample(screen, &half, &values)?;
+    after("upsampling");
+    Ok(visibility)
 }
 
 fn value_at(full: &Screen, half: &Screen, values: &[f32], at: [usize; 2]) -> f32 {
@@ -149,7 +154,9 @@ mod tests {
     fn walls_are_open_and_pictures_are_pictures() {
         for (name, estimate) in methods() {
             println!("{name}");
-            let halved = |screen: &Screen| at_half_resolution(screen, |half| Ok(estimate(half))).unwrap();
+            let halved = |screen: &Screen| {
+                at_half_resolution(screen, &mut |_| (), |half, _| Ok(estimate(half))).unwrap()
+            };
             check_walls(&halved, 60.0, 0.98);
             check_pictures(&halved);
         }
@@ -188,7 +195,7 @@ mod tests {
             let (_, screen) = draw(&still_life(), &camera, [320, 240]);
             for (name, estimate) in methods() {
                 let full = estimate(&screen);
-                let halved = at_half_resolution(&screen, |half| Ok(estimate(half))).unwrap();
+                let halved = at_half_resolution(&screen, &mut |_| (), |half, _| Ok(estimate(half))).unwrap();
                 let off = full.iter().zip(&halved).map(|(a, b)| (a - b).abs());
                 let mean = off.sum::<f32>() / full.len() as f32;
                 println!("{name}: {mean}");

@@ -1,7 +1,9 @@
 //! Arguments of `dapple view`.
 
 use std::path::PathBuf;
+use std::sync::LazyLock;
 
+use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use dapple_client::viewer::{DebugView, Method};
 use dapple_render::screen_space::ScreenKind;
@@ -145,60 +147,42 @@ impl Preset {
 }
 
 /// A viewer's [`Method`] by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum ViewMethod {
-    /// Points, through the visibility atlas.
-    Psao,
-    /// Points, by the paper's look-up.
-    PsaoPaper,
-    /// Screen space: random places in a hemisphere.
-    Ssao,
-    /// Screen space: AlchemyAO.
-    Alchemy,
-    /// Screen space: scalable ambient obscurance.
-    Sao,
-    /// Screen space: horizons.
-    Hbao,
-    /// Screen space: HBAO+.
-    HbaoPlus,
-    /// Screen space: GTAO with a visibility bitmask.
-    Gtao,
-    /// Screen space: SSAO over a stochastic depth map.
-    SdSsao,
-    /// Screen space: horizons over a stochastic depth map.
-    SdHbao,
-    /// Screen space: HBAO+ over a stochastic depth map.
-    SdHbaoPlus,
-    /// No occlusion.
-    None,
-}
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct ViewMethod(pub(crate) Method);
 
 impl ViewMethod {
     /// Which screen-space method it is, if it is one.
     pub(crate) fn screen_space(self) -> Option<ScreenKind> {
-        Some(match self {
-            ViewMethod::Ssao => ScreenKind::Ssao,
-            ViewMethod::Alchemy => ScreenKind::Alchemy,
-            ViewMethod::Sao => ScreenKind::Sao,
-            ViewMethod::Hbao => ScreenKind::Hbao,
-            ViewMethod::HbaoPlus => ScreenKind::HbaoPlus,
-            ViewMethod::Gtao => ScreenKind::Gtao,
-            ViewMethod::SdSsao => ScreenKind::SdSsao,
-            ViewMethod::SdHbao => ScreenKind::SdHbao,
-            ViewMethod::SdHbaoPlus => ScreenKind::SdHbaoPlus,
-            ViewMethod::Psao | ViewMethod::PsaoPaper | ViewMethod::None => return None,
-        })
+        match self.0 {
+            Method::Screen(kind) => Some(kind),
+            _ => None,
+        }
     }
 }
 
-impl From<ViewMethod> for Method {
-    fn from(method: ViewMethod) -> Method {
-        match (method, method.screen_space()) {
-            (_, Some(kind)) => Method::Screen(kind),
-            (ViewMethod::Psao, _) => Method::Psao,
-            (ViewMethod::PsaoPaper, _) => Method::PsaoPaper,
-            _ => Method::None,
-        }
+impl ValueEnum for ViewMethod {
+    fn value_variants<'a>() -> &'a [ViewMethod] {
+        static ALL: LazyLock<Vec<ViewMethod>> =
+            LazyLock::new(|| Method::ALL.into_iter().map(ViewMethod).collect());
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let help = match self.0 {
+            Method::Psao => "Points, through the visibility atlas",
+            Method::PsaoPaper => "Points, by the paper's look-up",
+            Method::None => "No occlusion",
+            Method::Screen(ScreenKind::Ssao) => "Screen space: random places in a hemisphere",
+            Method::Screen(ScreenKind::Alchemy) => "Screen space: AlchemyAO",
+            Method::Screen(ScreenKind::Sao) => "Screen space: scalable ambient obscurance",
+            Method::Screen(ScreenKind::Hbao) => "Screen space: horizons",
+            Method::Screen(ScreenKind::HbaoPlus) => "Screen space: HBAO+",
+            Method::Screen(ScreenKind::Gtao) => "Screen space: GTAO with a visibility bitmask",
+            Method::Screen(ScreenKind::SdSsao) => "Screen space: SSAO over a stochastic depth map",
+            Method::Screen(ScreenKind::SdHbao) => "Screen space: horizons over a stochastic depth map",
+            Method::Screen(ScreenKind::SdHbaoPlus) => "Screen space: HBAO+ over a stochastic depth map",
+        };
+        Some(PossibleValue::new(self.0.name()).help(help))
     }
 }
 

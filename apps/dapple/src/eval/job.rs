@@ -20,7 +20,6 @@ use super::truth::Cache;
 use crate::args::Method;
 use crate::judge::Judge;
 use crate::picture::{Compared, Shown, sites};
-use crate::screen_space::Sight;
 
 /// What is run together.
 #[derive(Debug, Clone, PartialEq)]
@@ -267,14 +266,8 @@ impl Line {
                 Some(visibility)
             }
             (Method::Screen(method), _) => {
-                let sight = Sight {
-                    scene: stage.scene(),
-                    pose: &drawn.pose,
-                    camera: &stage.camera_at(drawn),
-                    gbuffer: &drawn.gbuffer,
-                    radius_m: stage.radius_m,
-                    seed: stage.settings.seed,
-                };
+                let camera = stage.camera_at(drawn);
+                let sight = stage.sight(stage.scene(), &drawn.pose, &camera, &drawn.gbuffer);
                 let estimate = method.estimate(&sight, stage.settings.effort)?;
                 own_time = Some(estimate.time);
                 Some(estimate.visibility)

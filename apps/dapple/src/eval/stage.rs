@@ -5,6 +5,7 @@ use std::rc::Rc;
 
 use anyhow::Result;
 use dapple_client::{Drawn, PictureParams, draw};
+use dapple_render::gbuffer::GBuffer;
 use dapple_render::shade::{Gathering, Openings, ShadeParams, shade_gathered};
 use dapple_scene::{CameraPath, Pose, PosedCamera, Scene};
 use dapple_trace::Tracer;
@@ -13,6 +14,7 @@ use super::plan::{CLIENT_HZ, Settings};
 use super::still::{StillMap, still_map};
 use super::truth::{Cache, Request, open_directions};
 use crate::picture::Shown;
+use crate::screen_space::Sight;
 use crate::source::Loaded;
 
 /// Pictures are kept while they fit into so many bytes, and drawn again where they do not.
@@ -211,6 +213,17 @@ impl<'a> Stage<'a> {
     pub(super) fn camera(&self, time_s: f64) -> PosedCamera {
         let scene = self.scene();
         self.path.camera(scene, &scene.pose_undeformed(time_s))
+    }
+
+    /// What screen-space methods look at in a picture of the scene, or of one made from it.
+    pub(super) fn sight<'b>(
+        &self,
+        scene: &'b Scene,
+        pose: &'b Pose,
+        camera: &'b PosedCamera,
+        gbuffer: &'b GBuffer,
+    ) -> Sight<'b> {
+        Sight { scene, pose, camera, gbuffer, radius_m: self.radius_m, seed: self.settings.seed }
     }
 
     /// The scene's tracer in a picture's pose.

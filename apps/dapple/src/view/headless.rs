@@ -8,7 +8,6 @@ use dapple_gpu::{Gpu, wgpu};
 
 use super::live::Start;
 use super::picture;
-use super::quality::{METHODS, VIEWS, name_of};
 use super::show::{Opening, Show};
 use crate::args::ViewArgs;
 use crate::picture::write_png;
@@ -67,8 +66,8 @@ pub(super) fn run(args: &ViewArgs, opening: Opening) -> Result<()> {
         args.size,
         folder.display(),
         show.title,
-        name_of(&METHODS, show.options.method),
-        name_of(&VIEWS, show.options.view),
+        show.options.method.name(),
+        show.options.view.name(),
         stats.points,
         stats.texels,
         first_bytes.unwrap_or(0),

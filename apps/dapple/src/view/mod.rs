@@ -21,7 +21,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::{Result, bail};
-use dapple_client::viewer::{DrawOptions, ScreenOptions};
+use dapple_client::viewer::{DrawOptions, Method, ScreenOptions};
 
 use crate::args::{LightArgs, ViewArgs, ViewMethod};
 use crate::live::Address;
@@ -81,7 +81,7 @@ fn check(args: &ViewArgs) -> Result<()> {
     if args.fade.is_some_and(|seconds| !(0.0..=10.0).contains(&seconds)) {
         bail!("--fade must be 0 to 10 seconds");
     }
-    if args.fallback.screen_space().is_none() && args.fallback != ViewMethod::None {
+    if args.fallback.screen_space().is_none() && args.fallback != ViewMethod(Method::None) {
         bail!("--fallback stands in for points: choose a screen-space method (as sao), or none");
     }
     if let Some(file) = &args.record_path {
@@ -148,7 +148,7 @@ fn open(args: &ViewArgs) -> Result<Opening> {
     // Pictures in files show updates as they come.
     let fade_s = args.fade.or(if args.headless { Some(0.0) } else { usual.fade_s });
     // The error is that between two methods, side by side or not.
-    let other = args.other.into();
+    let other = args.other.0;
     let split = match args.split {
         Some(part) => Some((part, other)),
         None if args.view == crate::args::ViewKind::Error => Some((0.0, other)),
@@ -161,7 +161,7 @@ fn open(args: &ViewArgs) -> Result<Opening> {
     };
     let options = DrawOptions {
         view: args.view.into(),
-        method: args.method.into(),
+        method: args.method.0,
         split,
         fade_s,
         fallback: args.fallback.screen_space(),

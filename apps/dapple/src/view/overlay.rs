@@ -1,9 +1,9 @@
 //! What lies over the picture: figures, choices, time, help, messages.
 
-use dapple_client::viewer::Method;
+use dapple_client::viewer::{DebugView, Method};
 use egui::{Align2, Color32, Context, RichText, Slider, Ui, vec2};
 
-use super::quality::{METHODS, PRESETS, Quality, VIEWS, name_of};
+use super::quality::{PRESETS, Quality};
 use super::show::{Figures, Show};
 use crate::args::Preset;
 use crate::live::LinkState;
@@ -201,9 +201,9 @@ fn live_rows(show: &mut Show) -> Vec<(&'static str, String)> {
 fn choices(ui: &mut Ui, show: &mut Show) -> Option<Wish> {
     let mut wish = None;
     let pick_method = |ui: &mut Ui, label: &str, method: &mut Method| {
-        egui::ComboBox::from_label(label).selected_text(name_of(&METHODS, *method)).show_ui(ui, |ui| {
-            for (choice, name) in METHODS {
-                ui.selectable_value(method, choice, name);
+        egui::ComboBox::from_label(label).selected_text(method.name()).show_ui(ui, |ui| {
+            for choice in Method::ALL {
+                ui.selectable_value(method, choice, choice.name());
             }
         });
     };
@@ -218,9 +218,9 @@ fn choices(ui: &mut Ui, show: &mut Show) -> Option<Wish> {
     if let Some((_, other)) = &mut show.options.split {
         pick_method(ui, "right of the line", other);
     }
-    egui::ComboBox::from_label("view").selected_text(name_of(&VIEWS, show.options.view)).show_ui(ui, |ui| {
-        for (choice, name) in VIEWS {
-            ui.selectable_value(&mut show.options.view, choice, name);
+    egui::ComboBox::from_label("view").selected_text(show.options.view.name()).show_ui(ui, |ui| {
+        for choice in DebugView::ALL {
+            ui.selectable_value(&mut show.options.view, choice, choice.name());
         }
     });
     let quality = show.quality();
@@ -292,9 +292,8 @@ fn divider(ctx: &Context, show: &mut Show) {
             let at = egui::pos2(rect.center().x + side, screen.bottom() - 8.0);
             painter.text(at, align, text, egui::FontId::proportional(14.0), Color32::WHITE);
         };
-        label(Align2::RIGHT_BOTTOM, -8.0, name_of(&METHODS, method));
-        let right =
-            if view == dapple_client::viewer::DebugView::Error { "error" } else { name_of(&METHODS, *other) };
+        label(Align2::RIGHT_BOTTOM, -8.0, method.name());
+        let right = if view == DebugView::Error { view.name() } else { other.name() };
         label(Align2::LEFT_BOTTOM, 8.0, right);
     });
 }

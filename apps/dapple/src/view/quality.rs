@@ -1,8 +1,4 @@
-//! Presets, and the names of what can be chosen.
-
-use dapple_client::viewer::{DebugView, Method};
-
-use dapple_render::screen_space::ScreenKind;
+//! Presets, and what comes after a choice.
 
 use crate::args::{Preset, ViewArgs};
 
@@ -38,60 +34,27 @@ impl Quality {
 pub(super) const PRESETS: [(Preset, &str); 3] =
     [(Preset::Phone, "phone"), (Preset::Headset, "headset"), (Preset::Desktop, "desktop")];
 
-pub(super) const METHODS: [(Method, &str); 12] = [
-    (Method::Psao, "psao"),
-    (Method::PsaoPaper, "psao-paper"),
-    screen(ScreenKind::Ssao),
-    screen(ScreenKind::Alchemy),
-    screen(ScreenKind::Sao),
-    screen(ScreenKind::Hbao),
-    screen(ScreenKind::HbaoPlus),
-    screen(ScreenKind::Gtao),
-    screen(ScreenKind::SdSsao),
-    screen(ScreenKind::SdHbao),
-    screen(ScreenKind::SdHbaoPlus),
-    (Method::None, "none"),
-];
-
-const fn screen(kind: ScreenKind) -> (Method, &'static str) {
-    (Method::Screen(kind), kind.name())
-}
-
-pub(super) const VIEWS: [(DebugView, &str); 8] = [
-    (DebugView::Beauty, "beauty"),
-    (DebugView::Visibility, "visibility"),
-    (DebugView::Normal, "normal"),
-    (DebugView::Points, "points"),
-    (DebugView::Texels, "texels"),
-    (DebugView::Weights, "weights"),
-    (DebugView::Age, "age"),
-    (DebugView::Error, "error"),
-];
-
-/// The name of a choice.
-pub(super) fn name_of<T: PartialEq>(table: &[(T, &'static str)], choice: T) -> &'static str {
-    table.iter().find(|(known, _)| *known == choice).map_or("", |(_, name)| name)
-}
-
 /// The choice after this one, round and round.
-pub(super) fn next_of<T: PartialEq + Copy>(table: &[(T, &'static str)], choice: T) -> T {
-    let at = table.iter().position(|(known, _)| *known == choice).map_or(0, |at| at + 1);
-    table.get(at).or(table.first()).map_or(choice, |(next, _)| *next)
+pub(super) fn next_of<T: PartialEq + Copy>(all: &[T], choice: T) -> T {
+    let at = all.iter().position(|known| *known == choice).map_or(0, |at| at + 1);
+    all.get(at).or(all.first()).copied().unwrap_or(choice)
 }
 
 #[cfg(test)]
 mod tests {
+    use dapple_client::viewer::{DebugView, Method};
+
     use super::*;
 
     #[test]
     fn choices_go_round() {
-        let mut view = DebugView::Beauty;
-        let mut seen = Vec::new();
-        for _ in VIEWS {
-            seen.push(name_of(&VIEWS, view));
-            view = next_of(&VIEWS, view);
+        let (mut view, mut seen) = (DebugView::Beauty, Vec::new());
+        for _ in DebugView::ALL {
+            seen.push(view);
+            view = next_of(&DebugView::ALL, view);
         }
-        assert_eq!(seen, VIEWS.map(|(_, name)| name));
+        assert_eq!(seen, DebugView::ALL);
         assert_eq!(view, DebugView::Beauty);
+        assert_eq!(next_of(&Method::ALL, Method::None), Method::Psao);
     }
 }

@@ -15,7 +15,7 @@ use winit::window::Fullscreen;
 use super::overlay::{Overlay, Wish};
 use super::paint::Painter;
 use super::picture;
-use super::quality::{METHODS, Quality, VIEWS, next_of};
+use super::quality::{Quality, next_of};
 use super::record_path::{Going, PathRecorder, write_new};
 use super::retries::Retries;
 use super::screen::{Next, Screen};
@@ -298,14 +298,14 @@ impl Session {
                 show.steering.fit(&scene, time_s, width as f32 / height as f32);
             }
             KeyCode::KeyR => self.toggle_recording(now_s),
-            KeyCode::KeyM => show.options.method = next_of(&METHODS, show.options.method),
+            KeyCode::KeyM => show.options.method = next_of(&Method::ALL, show.options.method),
             KeyCode::KeyB => {
                 show.options.split = match show.options.split {
                     None => Some((0.5, Method::None)),
                     Some(_) => None,
                 };
             }
-            KeyCode::KeyV => show.options.view = next_of(&VIEWS, show.options.view),
+            KeyCode::KeyV => show.options.view = next_of(&DebugView::ALL, show.options.view),
             KeyCode::F12 | KeyCode::KeyP => self.screenshot(now_s),
             KeyCode::F11 => {
                 let window = &self.screen.window;
@@ -314,7 +314,7 @@ impl Session {
             }
             _ => {
                 if let Some(index) = VIEW_KEYS.iter().position(|key| *key == code) {
-                    show.options.view = VIEWS[index].0;
+                    show.options.view = DebugView::ALL[index];
                 }
             }
         }

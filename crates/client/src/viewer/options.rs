@@ -46,6 +46,30 @@ pub enum Method {
     Screen(ScreenKind),
 }
 
+impl Method {
+    /// All, points first.
+    pub const ALL: [Method; 3 + ScreenKind::ALL.len()] = {
+        let mut all = [Method::None; 3 + ScreenKind::ALL.len()];
+        (all[0], all[1]) = (Method::Psao, Method::PsaoPaper);
+        let mut i = 0;
+        while i < ScreenKind::ALL.len() {
+            all[2 + i] = Method::Screen(ScreenKind::ALL[i]);
+            i += 1;
+        }
+        all
+    };
+
+    /// As programs and pages name it: lower case, words joined by hyphens.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Method::None => "none",
+            Method::Psao => "psao",
+            Method::PsaoPaper => "psao-paper",
+            Method::Screen(kind) => kind.name(),
+        }
+    }
+}
+
 /// What methods that look at the picture alone are given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScreenOptions {
@@ -85,6 +109,34 @@ pub enum DebugView {
     Age,
     /// Difference of the method and the one of a split screen (of no method at all without a split).
     Error,
+}
+
+impl DebugView {
+    /// All, the lit scene first.
+    pub const ALL: [DebugView; 8] = [
+        DebugView::Beauty,
+        DebugView::Visibility,
+        DebugView::Normal,
+        DebugView::Points,
+        DebugView::Texels,
+        DebugView::Weights,
+        DebugView::Age,
+        DebugView::Error,
+    ];
+
+    /// As programs and pages name it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            DebugView::Beauty => "beauty",
+            DebugView::Visibility => "visibility",
+            DebugView::Normal => "normal",
+            DebugView::Points => "points",
+            DebugView::Texels => "texels",
+            DebugView::Weights => "weights",
+            DebugView::Age => "age",
+            DebugView::Error => "error",
+        }
+    }
 }
 
 /// How one picture is drawn.

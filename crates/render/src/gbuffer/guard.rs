@@ -2,7 +2,7 @@
 
 use dapple_scene::{Pose, PosedCamera, Projection, Scene};
 
-use super::{GBuffer, rasterize};
+use super::{GBuffer, MAX_SAMPLES, MAX_SIDE, rasterize};
 use crate::RenderError;
 
 /// How many pixels are drawn beyond each side of a picture. [`GuardBand::default`] is none.
@@ -26,6 +26,25 @@ impl GuardBand {
             return Err(RenderError::Parameter { name, found: part.into(), range });
         }
         Ok(GuardBand { pixels: (f64::from(part) * f64::from(height) - 1e-3).ceil().max(0.0) as u32 })
+    }
+
+    /// The same, but no wider than what [`rasterize`] draws of a picture of so many pixels.
+    pub fn within(self, [width, height]: [u32; 2], samples_per_axis: u32) -> GuardBand {
+        let fits = |pixels: u32| {
+            let [columns, rows] = GuardBand { pixels }
+                .size([width, height])
+                .map(|side| u64::from(side) * u64::from(samples_per_axis));
+            let side = u64::from(MAX_SIDE);
+            GuardBand { pixels }.size([width, height]).into_iter().all(|pixels| u64::from(pixels) <= side)
+                && columns.saturating_mul(rows) <= MAX_SAMPLES
+        };
+        // Of a range of widths that fit up to some width the last.
+        let (mut fitting, mut beyond) = (0, self.pixels + 1);
+        while fitting + 1 < beyond {
+            let middle = fitting + (beyond - fitting) / 2;
+            if fits(middle) { fitting = middle } else { beyond = middle }
+        }
+        GuardBand { pixels: fitting }
     }
 
     /// Pixels beyond each side.
@@ -107,6 +126,17 @@ mod tests {
     use crate::gbuffer::Screen;
     use crate::testing::screen::{draw, look, still_life};
     use crate::testing::{Stage, cube, ground};
+
+    #[test]
+    fn bands_shrink_to_what_can_be_drawn() {
+        let band = GuardBand { pixels: 108 };
+        assert_eq!(band.within([1920, 1080], 4), band);
+        assert_eq!(band.within([MAX_SIDE, 1080], 1).pixels, 0);
+        assert_eq!(band.within([MAX_SIDE - 7, 1080], 1).pixels, 3);
+        // 2^28 samples are 2048 × 2048 pixels of 64.
+        assert_eq!(GuardBand { pixels: 900 }.within([2000, 2000], 8).pixels, 24);
+        assert_eq!(GuardBand { pixels: u32::MAX - 1 }.within([1, 1], 1).pixels, (MAX_SIDE - 1) / 2);
+    }
 
     fn lenses() -> [Projection; 2] {
         [

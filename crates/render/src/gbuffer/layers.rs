@@ -64,6 +64,7 @@ impl Layers {
         depths.resize(fragments as usize, 0.0f32);
 
         let mut starts = buffer(view, 0u32)?;
+        starts.try_reserve_exact(1).map_err(no_memory)?;
         starts.push(0);
         for (i, count) in counts.iter().enumerate() {
             starts[i + 1] = starts[i] + count;

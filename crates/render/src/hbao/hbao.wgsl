@@ -100,10 +100,8 @@ fn horizon_at(seen: vec2<i32>, place: vec3<f32>, normal: vec3<f32>, sin_bias: f3
             }
         }
     }
-    if most.x > best.x {
-        return vec2(params.compensation * most.x, most.y);
-    }
-    return best;
+    most.x *= params.compensation;
+    return select(best, most, most.x > best.x);
 }
 
 fn occlusion_at(at: vec2<i32>) -> f32 {

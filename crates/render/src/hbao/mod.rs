@@ -262,8 +262,8 @@ impl<'a> Estimator<'a> {
                 let gains = self.to_hidden(centre, at).filter_map(gain);
                 gains.reduce(|best, other| if other.0 > best.0 { other } else { best })
             };
-            let hidden = hidden.filter(|(more, _)| seen.is_none_or(|seen| *more > seen.0));
             let hidden = hidden.map(|(more, found)| (self.lookup.compensation * more, found));
+            let hidden = hidden.filter(|(more, _)| *more > seen.map_or(0.0, |seen| seen.0));
             if let Some((more, found)) = hidden.or(seen) {
                 sum += more;
                 sine = found;

@@ -7,7 +7,7 @@ use crate::hbao::{self, HbaoParams, Horizon};
 use crate::sao::{self, SaoParams};
 use crate::sdao::{Hidden, Looks, Lookup, MapParams, StochasticMap};
 use crate::ssao::{self, SsaoParams};
-use crate::{Chosen, Preset, RenderError};
+use crate::{AfterPass, Chosen, Preset, RenderError};
 
 /// Which method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -201,6 +201,22 @@ impl ScreenMethod {
         }
     }
 
+    /// The same with another seed, where it draws random numbers.
+    pub fn with_seed(self, seed: u32) -> ScreenMethod {
+        match self {
+            ScreenMethod::Ssao(params) => ScreenMethod::Ssao(SsaoParams { seed, ..params }),
+            ScreenMethod::Stochastic(layered, stochastic) => {
+                let map = MapParams { seed, ..stochastic.map };
+                let layered = match layered {
+                    Layered::Ssao(params) => Layered::Ssao(SsaoParams { seed, ..params }),
+                    other => other,
+                };
+                ScreenMethod::Stochastic(layered, StochasticParams { map, ..stochastic })
+            }
+            other => other,
+        }
+    }
+
     /// Visibility 0 … 1 of each sample of a picture, row-major from the top, 1 for the background: the method's own `estimate_visibility`. A stochastic method is given
     /// its map; the others need none.
     ///
@@ -211,22 +227,37 @@ impl ScreenMethod {
         screen: &Screen,
         map: Option<&StochasticMap>,
     ) -> Result<Vec<f32>, RenderError> {
-        match self {
-            ScreenMethod::Ssao(params) => ssao::estimate_visibility(screen, params),
-            ScreenMethod::Alchemy(params) => alchemy::estimate_visibility(screen, params),
-            ScreenMethod::Sao(params) => sao::estimate_visibility(screen, params),
-            ScreenMethod::Hbao(params) => hbao::estimate_visibility(screen, params),
-            ScreenMethod::Gtao(params) => gtao::estimate_visibility(screen, params),
-            ScreenMethod::Stochastic(layered, stochastic) => {
+        let lookup = match self {
+            ScreenMethod::Stochastic(_, StochasticParams { looks, compensation, .. }) => {
                 RenderError::check_length("stochastic maps", usize::from(map.is_some()), 1)?;
                 let hidden = map.map_or(Hidden::Nothing, Hidden::Stochastic);
-                let StochasticParams { looks, compensation, .. } = *stochastic;
-                let lookup = Lookup { hidden, looks, compensation };
-                match layered {
-                    Layered::Ssao(params) => ssao::estimate_visibility_with(screen, params, &lookup),
-                    Layered::Hbao(params) => hbao::estimate_visibility_with(screen, params, &lookup),
-                }
+                Lookup { hidden, looks: *looks, compensation: *compensation }
             }
+            _ => Lookup::default(),
+        };
+        self.estimate_by_passes(screen, &lookup, &mut |_| ())
+    }
+
+    /// The same with what is known of hidden surfaces, which AlchemyAO, SAO and GTAO do not look at; `after` is told the name of each pass.
+    ///
+    /// # Errors
+    /// A parameter out of its range, or hidden surfaces of another picture.
+    pub fn estimate_by_passes(
+        &self,
+        screen: &Screen,
+        lookup: &Lookup<'_>,
+        after: AfterPass<'_>,
+    ) -> Result<Vec<f32>, RenderError> {
+        match self {
+            ScreenMethod::Ssao(params) | ScreenMethod::Stochastic(Layered::Ssao(params), _) => {
+                ssao::estimate_by_passes(screen, params, lookup, after)
+            }
+            ScreenMethod::Hbao(params) | ScreenMethod::Stochastic(Layered::Hbao(params), _) => {
+                hbao::estimate_by_passes(screen, params, lookup, after)
+            }
+            ScreenMethod::Alchemy(params) => alchemy::estimate_by_passes(screen, params, after),
+            ScreenMethod::Sao(params) => sao::estimate_by_passes(screen, params, after),
+            ScreenMethod::Gtao(params) => gtao::estimate_by_passes(screen, params, after),
         }
     }
 }

@@ -144,7 +144,8 @@ fn twin(stage: &Stage, view: &ScreenView, map: Option<&StochasticMap>) -> (Vec<f
     let camera = view.guard.camera(&view.camera, size[1]);
     let screen = wide.screen(&stage.scene, &stage.pose, &camera).unwrap();
     let values = if view.half_resolution {
-        at_half_resolution(&screen, |half| view.method.estimate_visibility(half, map)).unwrap()
+        at_half_resolution(&screen, &mut |_| (), |half, _| view.method.estimate_visibility(half, map))
+            .unwrap()
     } else {
         view.method.estimate_visibility(&screen, map).unwrap()
     };

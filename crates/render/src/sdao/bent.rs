@@ -13,7 +13,8 @@ use crate::hbao::{Estimator, HbaoParams};
 /// Where samples of a picture are open.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BentNormals {
-    /// How much, by cosine, 0 … 1; 1 for the background.
+    /// How much, by cosine, 0 … 1; 1 for the background. As much as the method finds, or more: here each direction blocks at most itself, there all together
+    /// at most all.
     pub visibility: Vec<f32>,
     /// Mean by cosine of open directions, blocked ones as zero, in view space: 2/3 of the normal if all is open; zero for the background.
     pub open_view: Vec<Vec3>,

@@ -61,6 +61,9 @@ impl MapParams {
     }
 }
 
+/// Most distances of a map; each takes 4 bytes.
+pub const MAX_DISTANCES: u64 = 1 << 30;
+
 /// Distances of some of the surfaces under each sample of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StochasticMap {
@@ -115,6 +118,10 @@ impl StochasticMap {
         params: &MapParams,
     ) -> Result<StochasticMap, RenderError> {
         params.check()?;
+        let distances = u64::from(view.columns) * u64::from(view.rows) * u64::from(params.samples);
+        if distances > MAX_DISTANCES {
+            return Err(RenderError::Fragments { fragments: distances, most: MAX_DISTANCES });
+        }
         let chooser = Chooser::new(params.picks, params.samples, params.alpha, params.seed);
         let keep = Keep { scene, pose, view, first, chooser };
         let depths = match params.samples {

@@ -12,7 +12,7 @@ mod tests;
 
 pub use bent::{BentNormals, bent_normals};
 pub use hidden::{Hidden, Looks, Lookup};
-pub use map::{MapParams, StochasticMap};
+pub use map::{MAX_DISTANCES, MapParams, StochasticMap};
 pub use multi_view::{SideParams, SideView, estimate_visibility as estimate_visibility_of_two};
 #[cfg(feature = "gpu")]
 pub(crate) use picks::ChoiceTable;

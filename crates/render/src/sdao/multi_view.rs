@@ -8,7 +8,7 @@ use super::map::{MapParams, StochasticMap};
 use crate::bilateral::Bilateral;
 use crate::gbuffer::{Screen, rasterize};
 use crate::hbao::{Centre, Estimator, HbaoParams, Horizon};
-use crate::{RenderError, projection};
+use crate::{AfterPass, RenderError, projection};
 
 /// Where the second camera stands, and how fine its picture is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -164,7 +164,7 @@ impl SideView {
 }
 
 /// Visibility as of [`hbao::estimate_visibility_with`](crate::hbao::estimate_visibility_with) with HBAO+, the more occlusion of what both cameras see
-/// (Alg. 3, line 5). `lookup` is of the first one.
+/// (Alg. 3, line 5). `lookup` is of the first one; `after` is told when each pass is done: `samples`, `blur`.
 ///
 /// # Errors
 /// A parameter out of its range, [`Horizon::Highest`], or hidden surfaces of another picture.
@@ -173,6 +173,7 @@ pub fn estimate_visibility(
     params: &HbaoParams,
     lookup: &Lookup<'_>,
     side: &SideView,
+    after: AfterPass<'_>,
 ) -> Result<Vec<f32>, RenderError> {
     params.check()?;
     lookup.check(screen)?;
@@ -194,5 +195,8 @@ pub fn estimate_visibility(
         }
         None => 1.0,
     });
-    Ok(Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility))
+    after("samples");
+    let visibility = Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility);
+    after("blur");
+    Ok(visibility)
 }

@@ -10,7 +10,7 @@ use super::{
     Errors, Findings, Study, StudyPlot, StudyTable, Subject, axis, column, line, row, size_of, stochastic,
 };
 use crate::eval::stage::Stage;
-use crate::screen_space::{Effort, ScreenSpace, Sight};
+use crate::screen_space::{Effort, ScreenSpace};
 
 #[derive(Debug, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -119,14 +119,7 @@ impl Study for HiddenLayers {
                 let grille = scene.instances.len() as u32 - 1;
                 let pose = scene.pose(moment.pose.time);
                 let gbuffer = rasterize(&scene, &pose, &moment.camera, size[0], size[1], 1)?;
-                let sight = Sight {
-                    scene: &scene,
-                    pose: &pose,
-                    camera: &moment.camera,
-                    gbuffer: &gbuffer,
-                    radius_m: stage.radius_m,
-                    seed: stage.settings.seed,
-                };
+                let sight = stage.sight(&scene, &pose, &moment.camera, &gbuffer);
                 let run = |method: ScreenSpace, compensation: f32| {
                     anyhow::Ok(method.estimate(&sight, Effort { compensation, ..effort })?.visibility)
                 };

@@ -25,6 +25,7 @@ use dapple_render::gbuffer::{GBuffer, GuardBand, Screen};
 use dapple_scene::{Pose, PosedCamera};
 use serde::de::DeserializeOwned;
 
+use super::figures::psnr_of;
 use super::results::{StudyAxis, StudyColumn, StudyLine, StudyPlot, StudyRow, StudyTable};
 use super::stage::Stage;
 use super::truth::Cache;
@@ -155,9 +156,7 @@ impl<'a> Subject<'a> {
 
     pub(super) fn sight<'b>(&'b self, moment: &'b Moment, gbuffer: &'b GBuffer) -> Result<Sight<'b>> {
         let stage = self.stage()?;
-        let (pose, camera) = (&moment.pose, &moment.camera);
-        let (radius_m, seed) = (stage.radius_m, stage.settings.seed);
-        Ok(Sight { scene: stage.scene(), pose, camera, gbuffer, radius_m, seed })
+        Ok(stage.sight(stage.scene(), &moment.pose, &moment.camera, gbuffer))
     }
 }
 
@@ -197,7 +196,7 @@ pub(super) fn stochastic(method: Layered, samples: u32, paper: bool) -> ScreenSp
 
 /// PSNR of a mean squared error with peak 1, in dB; infinite where there is none.
 pub(super) fn psnr_db(mse: f64) -> f64 {
-    -10.0 * libm::log10(mse)
+    psnr_of(mse).unwrap_or(f64::INFINITY)
 }
 
 /// Squared errors of several pictures.

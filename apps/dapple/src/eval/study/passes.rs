@@ -155,6 +155,7 @@ impl Passes {
             title: format!("All methods, {} × {}", size[0], size[1]),
             columns: vec![
                 column("levels", "ms", 2),
+                column("hidden surfaces", "ms", 2),
                 column("samples", "ms", 2),
                 column("blur", "ms", 2),
                 column("net", "ms", 2),
@@ -172,13 +173,15 @@ impl Passes {
             let (full, half) = (run(false)?, run(true)?);
             let net = |times: &[(&str, f64)]| times.iter().map(|(_, ms)| ms).sum::<f64>();
             let (samples, half_samples) = (of(&full, "samples"), of(&half, "samples"));
+            let sum = |passes: &[&str]| passes.iter().map(|pass| of(&full, pass)).sum::<f64>();
             let levels = of(&full, "levels");
-            let blur = net(&full) - samples - levels;
+            let hidden = sum(&["map", "second map", "layers"]);
             let rest = net(&half) - half_samples;
             let values = [
                 if levels > 0.0 { levels } else { f64::NAN },
+                if hidden > 0.0 { hidden } else { f64::NAN },
                 samples,
-                blur,
+                sum(&["blur", "quads", "bilateral"]),
                 net(&full),
                 half_samples,
                 rest,

@@ -160,6 +160,9 @@ fn turned(by_step: &[Vec<f64>]) -> Series {
     (0..patches).map(|patch| by_step.iter().map(|step| step[patch]).collect()).collect()
 }
 
+/// Most samples of all pictures of a piece of the path; each takes some 40 bytes.
+const MAX_SAMPLES: u64 = 1 << 27;
+
 impl Study for PopIn {
     fn title(&self) -> &'static str {
         "Pop-in while the camera moves"
@@ -177,6 +180,15 @@ impl Study for PopIn {
             bail!("steps is {}, must be 1 to 600", self.steps);
         }
         let stage = subject.stage()?;
+        // All pictures of a piece are held at once.
+        let samples = u64::from(self.steps + 1) * stage.samples();
+        if samples > MAX_SAMPLES {
+            bail!(
+                "{} pictures of {} samples are more than {MAX_SAMPLES} samples: fewer steps, or a smaller size",
+                self.steps + 1,
+                stage.samples()
+            );
+        }
         let (methods, pieces) = (subject.methods()?, stage.frame_times_s.len());
         let mut found = vec![Changes::default(); methods.len() + 1];
         let mut worst: Option<Worst> = None;

@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use super::{Errors, Findings, Study, StudyPlot, StudyTable, Subject, axis, column, line, row};
 use crate::eval::stage::Frame;
-use crate::screen_space::{Effort, ScreenSpace, Sight};
+use crate::screen_space::{Effort, ScreenSpace};
 
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -24,14 +24,8 @@ pub(super) fn look(
 ) -> Result<(Vec<f32>, Duration)> {
     let stage = subject.stage()?;
     let drawn = &frame.drawn;
-    let sight = Sight {
-        scene: stage.scene(),
-        pose: &drawn.pose,
-        camera: &stage.camera_at(drawn),
-        gbuffer: &drawn.gbuffer,
-        radius_m: stage.radius_m,
-        seed: stage.settings.seed,
-    };
+    let camera = stage.camera_at(drawn);
+    let sight = stage.sight(stage.scene(), &drawn.pose, &camera, &drawn.gbuffer);
     let estimate = method.estimate(&sight, effort)?;
     Ok((resolve_plane(&drawn.gbuffer, &estimate.visibility, 1.0)?.values.values, estimate.time))
 }
@@ -51,10 +45,7 @@ impl Study for Presets {
                 for (preset, (errors, ms)) in Preset::ALL.into_iter().zip(found) {
                     let effort = Effort { preset, half_resolution: None, ..stage.settings.effort };
                     let (visibility, time) = look(subject, &frame, *method, effort)?;
-                    let pixels = visibility.iter().zip(frame.truth.visibility()).zip(frame.truth.covered());
-                    pixels
-                        .filter(|(_, covered)| **covered)
-                        .for_each(|((v, truth), _)| errors.add(*v, *truth));
+                    errors.add_covered(&visibility, frame.truth.visibility(), frame.truth.covered());
                     *ms += 1e3 * time.as_secs_f64() / count as f64;
                 }
             }

@@ -1,6 +1,6 @@
 //! How exact distances and normals from a depth buffer are, by its format and the far plane: [McGuire2012] figures 3 and 4.
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use dapple_render::sao::precision::{DepthFormat, Deviation, Pipeline, deviation};
 use rayon::prelude::*;
 use serde::Deserialize;
@@ -63,6 +63,13 @@ impl Study for ZPrecision {
     }
 
     fn run(&self, subject: &Subject<'_>) -> Result<Findings> {
+        let near_m = Pipeline::default().near_m;
+        if self.distances.is_empty() || !self.distances.iter().all(|d| d.is_finite() && *d > near_m) {
+            bail!("distances must be numbers above the near plane's {near_m} m, at least one");
+        }
+        if !(1..=1_000_000).contains(&self.triangles) {
+            bail!("triangles is {}, must be 1 to 1000000", self.triangles);
+        }
         let far_columns = |digits| FAR_M.map(|far_m| column(&far_name(far_m), "", digits)).to_vec();
         let table = |title: &str, digits| StudyTable {
             title: title.to_owned(),

@@ -101,6 +101,36 @@ fn walls_are_open_pictures_are_pictures_and_lenses_agree() {
     }
 }
 
+/// Floors under a floor, and one far below: what lies behind a plane never blocks it, wherever it is looked for.
+#[test]
+fn a_plane_over_others_is_open() {
+    let mut stage = Stage::new();
+    for height in [0.0, -0.1, -0.3, -0.5, -4.0] {
+        stage.add(ground(60.0), 0, Affine3A::from_translation(Vec3::new(0.0, height, 0.0)));
+    }
+    for degrees in [10.0, 45.0, 70.0f64] {
+        let angle = degrees.to_radians();
+        let eye = Vec3::new(libm::sin(angle) as f32, libm::cos(angle) as f32, 0.1) * 4.0;
+        let camera = look(eye, Vec3::ZERO);
+        let (gbuffer, screen) = draw(&stage, &camera, [97, 61]);
+        let layers = Layers::draw(&stage.scene, &stage.pose, &camera, 97, 61, 1).unwrap();
+        let maps = SIZES.map(|samples| {
+            let params = MapParams::with_samples(samples);
+            StochasticMap::draw(&stage.scene, &stage.pose, &camera, &gbuffer, &params).unwrap()
+        });
+        let held = |map: &StochasticMap| map.distances_m(97 * 30 + 48).iter().any(|d| d.is_finite());
+        assert!(maps.iter().all(held), "there are floors in the maps");
+        let hidden = maps.iter().map(Hidden::Stochastic).chain([Hidden::Peeled(&layers)]);
+        for (hidden, (name, method)) in hidden.flat_map(|hidden| METHODS.map(|method| (hidden, method))) {
+            for looks in [Looks::Everywhere, Looks::WhereFirstIsFar, Looks::WhereFirstRises] {
+                let visibility = method(&screen, &Lookup { hidden, looks, compensation: 1.0 });
+                let least = visibility.iter().copied().fold(1.0, f32::min);
+                assert!(least >= 0.99, "{name}, {degrees}°, {looks:?}: {least}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_corner_darkens_as_it_does_by_a_single_layer() {
     // Nothing is hidden in it but the ground behind the wall.
@@ -129,9 +159,10 @@ fn a_map_of_nothing_else_is_a_single_layer_to_the_last_bit() {
         assert_ne!(alone, known, "{name}");
         assert_ne!(alone, method(&screen, &Lookup::peeled(&layers)), "{name}");
     }
-    let method = METHODS[2].1;
-    let weightless = Lookup { compensation: 0.0, ..Lookup::stochastic(&map) };
-    assert_eq!(method(&screen, &Lookup::default()), method(&screen, &weightless));
+    for (name, method) in METHODS {
+        let weightless = Lookup { compensation: 0.0, ..Lookup::stochastic(&map) };
+        assert_eq!(method(&screen, &Lookup::default()), method(&screen, &weightless), "{name}");
+    }
     let stage = walls(1);
     let (gbuffer, screen) = draw(&stage, &ahead(), [33, 21]);
     let map =

@@ -89,7 +89,9 @@ fn wrong_second_cameras_are_refused() {
     let (stage, (_, screen)) = (still_life(), draw(&still_life(), &camera, [16, 12]));
     let map = MapParams::default();
     let side = SideView::draw(&stage.scene, &stage.pose, &camera, [16, 12], &good, &map).unwrap();
-    let two = |params: &HbaoParams| estimate_visibility_of_two(&screen, params, &Lookup::default(), &side);
+    let two = |params: &HbaoParams| {
+        estimate_visibility_of_two(&screen, params, &Lookup::default(), &side, &mut |_| ())
+    };
     assert!(two(&HbaoParams::hbao_plus()).is_ok());
     assert!(two(&HbaoParams::hbao()).unwrap_err().to_string().contains("mean"));
 }
@@ -102,7 +104,7 @@ fn two_cameras(side: SideParams, map: MapParams) -> impl Fn(&Shot<'_>) -> Vec<f3
         let own = StochasticMap::draw(scene, pose, camera, gbuffer, &map).unwrap();
         let side = SideView::draw(scene, pose, camera, size, &side, &map).unwrap();
         let lookup = Lookup::stochastic(&own);
-        estimate_visibility_of_two(screen, &HbaoParams::hbao_plus(), &lookup, &side).unwrap()
+        estimate_visibility_of_two(screen, &HbaoParams::hbao_plus(), &lookup, &side, &mut |_| ()).unwrap()
     }
 }
 
