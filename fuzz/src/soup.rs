@@ -114,6 +114,7 @@ fn scene(triangles: &[[Vec3; 3]], maps: &[Affine3A]) -> (Scene, Pose) {
         mesh: 0,
         skin: None,
         casts: true,
+        emitter: Default::default(),
         receives: true,
         rest_from_mesh: Mat3::IDENTITY,
         spare: false,

@@ -20,7 +20,8 @@ mod preset;
 mod projection;
 #[cfg(test)]
 mod testing;
-mod texture;
+
+pub(crate) use dapple_scene::texture;
 
 pub mod alchemy;
 pub mod compose;

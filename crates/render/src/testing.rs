@@ -43,6 +43,7 @@ impl Stage {
             mesh: self.scene.meshes.len() as u32 - 1,
             skin: None,
             casts: true,
+            emitter: Default::default(),
             receives: true,
             rest_from_mesh: Mat3::from(world_from_mesh.matrix3),
             spare: false,

@@ -39,8 +39,8 @@ impl Scene {
             h.uint(instance.node);
             h.uint(instance.mesh);
             h.option(instance.skin);
-            h.byte(u8::from(instance.casts));
-            // Beside a flag, so that scenes without spares hash as they did before there were any.
+            // Beside flags, so that scenes without shapes of lights and without spares hash as they did before there were any.
+            h.byte(u8::from(instance.casts) | (instance.emitter as u8) << 1);
             h.byte(u8::from(instance.receives) | u8::from(instance.spare) << 1);
             h.floats(&instance.rest_from_mesh.to_cols_array());
         });

@@ -7,6 +7,7 @@
 //! [`Scene::pose_edited`] gives it of a scene that viewers have changed ([`edits`]).
 
 mod animation;
+pub mod area_lights;
 #[cfg(feature = "builtin")]
 pub mod builtin;
 mod camera;
@@ -20,11 +21,14 @@ mod mesh;
 pub mod path;
 mod pose;
 mod posing;
+mod reflectance;
 mod sample;
 mod scene;
 mod surface;
+pub mod texture;
 
 pub use animation::{Animation, Channel, ChannelTarget, Interpolation};
+pub use area_lights::EmitterShape;
 pub use camera::{Camera, PosedCamera, Projection};
 pub use edits::{Edit, EditError, Edits, LightSetting, Placement, Spare, SpareError};
 pub use light::{Light, LightKind, PosedLight};
@@ -33,6 +37,7 @@ pub use material::{AlphaMode, Filter, Image, Material, NormalTexture, Texture, T
 pub use mesh::{Mesh, MorphTarget, Part, SkinInfluences};
 pub use path::{CameraPath, CameraSource, KeyedPath};
 pub use pose::{DeformedMesh, Pose, PosedInstance};
+pub use reflectance::{Reflectance, ShadingPoint};
 pub use scene::{Aabb, Instance, LocalTransform, Node, Scene, SceneHash, Skin, Warning};
 
 pub use glam;

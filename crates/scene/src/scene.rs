@@ -2,7 +2,7 @@
 
 use glam::{Affine3A, Mat3, Mat4, Quat, Vec3};
 
-use crate::{Animation, Camera, Image, Light, Material, Mesh, Texture};
+use crate::{Animation, Camera, EmitterShape, Image, Light, Material, Mesh, Texture};
 
 /// A loaded scene. Indices between the lists are valid; `nodes` are ordered parents first.
 #[derive(Clone, Debug, Default)]
@@ -99,6 +99,8 @@ pub struct Instance {
     pub casts: bool,
     /// Carries points (`extras.receives`, default true).
     pub receives: bool,
+    /// What its emitting surface is taken for, when it lights others (`extras.light`, default its triangles).
+    pub emitter: EmitterShape,
     /// Rest space from mesh space: brings the mesh to world scale, so that rest-space distances are metres.
     ///
     /// For rigid and morphed instances it is the linear part of the node's world transform at time 0; for skinned

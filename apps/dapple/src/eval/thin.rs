@@ -80,6 +80,7 @@ fn add(scene: &mut Scene, mut mesh: Mesh) {
         mesh: scene.meshes.len() as u32,
         skin: None,
         casts: true,
+        emitter: Default::default(),
         receives: true,
         rest_from_mesh: Mat3::IDENTITY,
         spare: false,

@@ -1,10 +1,10 @@
 //! Light from the surroundings by where it comes from: about bent normals, or summed over the directions that are open.
 
-use dapple_scene::{Pose, PosedCamera, Projection, Scene};
+use dapple_scene::{Pose, PosedCamera, Projection, Reflectance, Scene};
 use glam::{Quat, Vec3};
 use rayon::prelude::*;
 
-use super::brdf::Reflectance;
+use super::brdf::reflected_ambient;
 use super::{Ambient, ShadeParams};
 use crate::gbuffer::{GBuffer, Surface};
 use crate::texture;
@@ -71,7 +71,7 @@ pub fn shade_gathered(
         let base_color = texture::base_color(scene, material, &surface.uv, surface.color).truncate();
         let reflectance = Reflectance::of(scene, material, &surface.uv, base_color, params.specular);
         let normal = surface.normal_shading_world;
-        Some(reflectance.ambient(&params.ambient, diffuse, normal, to_viewer_world))
+        Some(reflected_ambient(&reflectance, &params.ambient, diffuse, normal, to_viewer_world))
     };
     let samples = (0..samples).into_par_iter().with_min_len(1024);
     samples.map(|i| shade_one(i).unwrap_or(Vec3::ZERO)).collect()

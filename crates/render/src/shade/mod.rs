@@ -9,13 +9,13 @@ mod shadow;
 #[cfg(test)]
 mod tests;
 
-use dapple_scene::{Pose, PosedCamera, Projection, Scene};
+use dapple_scene::{Pose, PosedCamera, Projection, Reflectance, Scene, ShadingPoint};
 use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::gbuffer::{GBuffer, Surface};
 use crate::texture;
-use brdf::Reflectance;
+use brdf::reflected_ambient;
 pub use gathered::{Gathering, Openings, shade_gathered};
 pub use light::light_irradiance;
 pub(crate) use light::{ActiveLight, active_lights};
@@ -117,6 +117,43 @@ pub fn shade(
     Shaded { ambient, direct }
 }
 
+/// Every sample of a G-buffer as a place to be shaded, in the order of the samples; `None` for the background and what has no material.
+/// Unlit samples reflect nothing and emit their colour. For methods that bring light of their own.
+pub fn shading_points(
+    scene: &Scene,
+    pose: &Pose,
+    camera: &PosedCamera,
+    gbuffer: &GBuffer,
+    specular: bool,
+) -> Vec<Option<ShadingPoint>> {
+    let eye_world = camera.eye_world();
+    let axis_world = camera.world_from_view.transform_vector3(Vec3::Z).normalize_or_zero();
+    gbuffer.map_surfaces(scene, pose, |_, surface| {
+        let surface = surface?;
+        let to_viewer_world = match camera.projection {
+            Projection::Perspective { .. } => (eye_world - surface.position_world).normalize_or_zero(),
+            Projection::Orthographic { .. } => axis_world,
+        };
+        let material = scene.materials.get(surface.material as usize)?;
+        let base_color = texture::base_color(scene, material, &surface.uv, surface.color).truncate();
+        let mut reflectance = Reflectance::of(scene, material, &surface.uv, base_color, specular);
+        let mut emitted = texture::emission(scene, material, &surface.uv);
+        if material.unlit {
+            reflectance = Reflectance { diffuse: Vec3::ZERO, f0: Vec3::ZERO, specular: false, ..reflectance };
+            emitted = base_color;
+        }
+        Some(ShadingPoint {
+            instance: surface.instance,
+            position_world: surface.position_world,
+            normal_world: surface.normal_world,
+            normal_shading_world: surface.normal_shading_world,
+            to_viewer_world,
+            reflectance,
+            emitted,
+        })
+    })
+}
+
 fn shade_surface(
     scene: &Scene,
     surface: &Surface,
@@ -135,7 +172,7 @@ fn shade_surface(
     let reflectance = Reflectance::of(scene, material, &surface.uv, base_color, params.specular);
     let normal = surface.normal_shading_world;
     let gathered = params.ambient.radiance(normal);
-    let ambient = reflectance.ambient(&params.ambient, gathered, normal, to_viewer_world);
+    let ambient = reflected_ambient(&reflectance, &params.ambient, gathered, normal, to_viewer_world);
     let mut direct = texture::emission(scene, material, &surface.uv);
     for (i, light) in lights.iter().enumerate() {
         let arriving = light.arriving(surface.position_world);

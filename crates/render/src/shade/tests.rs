@@ -251,7 +251,7 @@ fn reflectance_is_reciprocal_and_keeps_energy() {
             // half vector, which gives a white gloss seen edge-on more than arrives: its formula, not our mistake.
             let most = if view > 1.0 { 1.2 } else { 1.03 };
             assert!((0.3..most).contains(&albedo), "{metallic} {roughness} {view}: {albedo}");
-            let furnace = r.ambient(&Ambient::Constant(Vec3::ONE), Vec3::ONE, Vec3::Y, viewer);
+            let furnace = reflected_ambient(&r, &Ambient::Constant(Vec3::ONE), Vec3::ONE, Vec3::Y, viewer);
             assert!(furnace.max_element() <= 1.0 + 1e-6 && furnace.min_element() > 0.5, "{furnace}");
         }
     }

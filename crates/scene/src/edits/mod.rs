@@ -260,8 +260,8 @@ impl Edits {
         let model = scene.instances.get(instance as usize)?;
         let is_like = |i: &u32| {
             scene.instances.get(*i as usize).is_some_and(|other| {
-                (other.mesh, other.skin, other.casts, other.receives)
-                    == (model.mesh, model.skin, model.casts, model.receives)
+                (other.mesh, other.skin, other.casts, other.receives, other.emitter)
+                    == (model.mesh, model.skin, model.casts, model.receives, model.emitter)
                     && other.rest_from_mesh == model.rest_from_mesh
             })
         };

@@ -29,6 +29,7 @@ fn scene() -> Scene {
         mesh,
         skin,
         casts: true,
+        emitter: Default::default(),
         receives: true,
         rest_from_mesh: Mat3::IDENTITY,
         spare: false,

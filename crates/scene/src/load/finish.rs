@@ -7,7 +7,7 @@ use glam::{Mat3, Vec3};
 
 use super::context::{Context, is_usable};
 use super::{LoadError, normals};
-use crate::{Aabb, Instance, Mesh, Pose, Scene};
+use crate::{Aabb, EmitterShape, Instance, Mesh, Pose, Scene};
 
 /// A scene under construction: node indices are those of the file, in any order.
 #[derive(Default)]
@@ -26,6 +26,7 @@ pub(super) struct Placement {
     pub(super) mesh: u32,
     pub(super) skin: Option<u32>,
     pub(super) casts: bool,
+    pub(super) emitter: EmitterShape,
     pub(super) receives: bool,
 }
 
@@ -71,6 +72,7 @@ pub(super) fn finish(context: &Context<'_>, draft: Draft) -> Result<(Scene, Vec<
             mesh: placement.mesh,
             skin: placement.skin,
             casts: placement.casts,
+            emitter: placement.emitter,
             receives: placement.receives,
             rest_from_mesh: Mat3::IDENTITY,
             spare: false,

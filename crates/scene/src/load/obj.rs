@@ -76,7 +76,14 @@ pub(super) fn load(context: &Context<'_>, bytes: &[u8], stem: &str) -> Result<Sc
         draft.scene.nodes.push(Node { name, ..Node::default() });
         draft.children.push(Vec::new());
         let (node, mesh) = (object as u32, object as u32);
-        draft.placements.push(Placement { node, mesh, skin: None, casts: true, receives: true });
+        draft.placements.push(Placement {
+            node,
+            mesh,
+            skin: None,
+            casts: true,
+            emitter: Default::default(),
+            receives: true,
+        });
     }
     finish::finish(context, draft).map(|(scene, _)| scene)
 }

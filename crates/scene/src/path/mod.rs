@@ -164,6 +164,7 @@ mod tests {
             mesh: 0,
             skin: None,
             casts: true,
+            emitter: Default::default(),
             receives: true,
             rest_from_mesh: Mat3::IDENTITY,
             spare: false,

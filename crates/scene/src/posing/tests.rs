@@ -31,6 +31,7 @@ fn scene(nodes: Vec<Node>, mesh: Mesh, node: u32, skin: Option<u32>) -> Scene {
         mesh: 0,
         skin,
         casts: true,
+        emitter: Default::default(),
         receives: true,
         rest_from_mesh: Mat3::IDENTITY,
         spare: false,

@@ -23,6 +23,7 @@ pub(crate) fn scene() -> Arc<Scene> {
         mesh: i,
         skin: None,
         casts: true,
+        emitter: Default::default(),
         receives: true,
         rest_from_mesh: Mat3::IDENTITY,
         spare: false,

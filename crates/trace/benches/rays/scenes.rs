@@ -58,6 +58,7 @@ impl Triangles {
             mesh: 0,
             skin: None,
             casts: true,
+            emitter: Default::default(),
             receives: true,
             rest_from_mesh: Mat3::IDENTITY,
             spare: false,

@@ -58,6 +58,7 @@ pub(super) fn add_mesh(scene: &mut Scene, mut mesh: Mesh) {
         mesh: scene.meshes.len() as u32 - 1,
         skin: None,
         casts: true,
+        emitter: Default::default(),
         receives: true,
         rest_from_mesh: Mat3::IDENTITY,
         spare: false,

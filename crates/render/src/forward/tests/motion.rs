@@ -66,6 +66,7 @@ pub(super) fn bent_and_swollen() -> Scene {
         mesh,
         skin,
         casts: true,
+        emitter: Default::default(),
         receives: true,
         rest_from_mesh: Mat3::IDENTITY,
         spare: false,

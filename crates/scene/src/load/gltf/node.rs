@@ -13,7 +13,7 @@ use super::document::{Document, label, name_of};
 use crate::load::LoadError;
 use crate::load::context::is_usable;
 use crate::load::finish::{Draft, Placement};
-use crate::{Camera, Light, LightKind, LocalTransform, Node, Projection, Skin};
+use crate::{Camera, EmitterShape, Light, LightKind, LocalTransform, Node, Projection, Skin};
 
 const MATRICES: Allowed = Allowed::new(&[Type::Mat4], &[ComponentType::F32]);
 
@@ -217,6 +217,7 @@ fn read_node(
             skin: skin.map(|skin| skin as u32),
             casts: flag("casts"),
             receives: flag("receives"),
+            emitter: read_emitter(document, extras.as_ref(), &at),
         });
     } else if skin.is_some() {
         context.warn(format!("{at} has a skin but no mesh; ignored"));
@@ -232,6 +233,21 @@ fn read_node(
     });
     draft.labels.push(at);
     Ok(())
+}
+
+/// What a node's mesh stands for as a light (`extras.light`).
+fn read_emitter(document: &Document<'_>, extras: Option<&Value>, at: &str) -> EmitterShape {
+    let Some(value) = extras.and_then(|extras| extras.get("light")) else { return EmitterShape::default() };
+    let known = EmitterShape::NAMES.iter().find(|(name, _)| value.as_str() == Some(name));
+    known.map_or_else(
+        || {
+            document.context.warn(format!(
+                "{at}: extras.light must be triangles, sphere, disc or rectangle; taken as triangles"
+            ));
+            EmitterShape::default()
+        },
+        |(_, shape)| *shape,
+    )
 }
 
 fn read_transform(

@@ -32,6 +32,7 @@ fn scene(walled: bool, wall_casts: bool) -> Scene {
             mesh: index,
             skin: None,
             casts,
+            emitter: Default::default(),
             receives: index == 0,
             rest_from_mesh: dapple_scene::glam::Mat3::IDENTITY,
             spare: false,

@@ -2,21 +2,22 @@
 
 use std::sync::LazyLock;
 
-use dapple_scene::{Filter, Image, Scene, Texture, TextureRef, Wrap};
 use glam::{Vec2, Vec3, Vec4};
+
+use crate::{Filter, Image, Material, Scene, Texture, TextureRef, Wrap};
 
 /// Linear light of the 256 sRGB codes (IEC 61966-2-1).
 static LINEAR_FROM_SRGB8: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| linear_from_srgb(code as f64 / 255.0) as f32));
 
 /// Linear light 0 … 1 of an sRGB value 0 … 1.
-pub(crate) fn linear_from_srgb(value: f64) -> f64 {
+pub fn linear_from_srgb(value: f64) -> f64 {
     if value <= 0.04045 { value / 12.92 } else { libm::pow((value + 0.055) / 1.055, 2.4) }
 }
 
 /// How the bytes of a texel become numbers.
-#[derive(Clone, Copy)]
-pub(crate) enum Encoding {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
     /// Red, green, blue are sRGB codes; alpha is linear.
     Srgb,
     /// All four are linear.
@@ -37,12 +38,12 @@ impl Encoding {
 }
 
 /// Image coordinates of a texture on a material, from both coordinate sets of a surface.
-pub(crate) fn image_coordinates(texture: &TextureRef, uv: &[Vec2; 2]) -> Vec2 {
+pub fn image_coordinates(texture: &TextureRef, uv: &[Vec2; 2]) -> Vec2 {
     texture.image_from_uv.transform_point2(uv[usize::from(texture.uv_set.min(1))])
 }
 
 /// The value of a material's texture at a surface; 1 in all channels where there is no such texture or image.
-pub(crate) fn sample(scene: &Scene, texture: &TextureRef, uv: &[Vec2; 2], encoding: Encoding) -> Vec4 {
+pub fn sample(scene: &Scene, texture: &TextureRef, uv: &[Vec2; 2], encoding: Encoding) -> Vec4 {
     let coordinates = image_coordinates(texture, uv);
     let Some(texture) = scene.textures.get(texture.texture as usize) else { return Vec4::ONE };
     let Some(image) = scene.images.get(texture.image as usize) else { return Vec4::ONE };
@@ -88,12 +89,7 @@ fn wrap(i: i64, n: i64, mode: Wrap) -> usize {
 }
 
 /// Base colour of a material (linear RGBA): factor × texture × vertex colour.
-pub(crate) fn base_color(
-    scene: &Scene,
-    material: &dapple_scene::Material,
-    uv: &[Vec2; 2],
-    vertex: Vec4,
-) -> Vec4 {
+pub fn base_color(scene: &Scene, material: &Material, uv: &[Vec2; 2], vertex: Vec4) -> Vec4 {
     let mut color = material.base_color_factor * vertex;
     if let Some(texture) = &material.base_color_texture {
         color *= sample(scene, texture, uv, Encoding::Srgb);
@@ -101,8 +97,8 @@ pub(crate) fn base_color(
     color
 }
 
-/// Emitted radiance of a material.
-pub(crate) fn emission(scene: &Scene, material: &dapple_scene::Material, uv: &[Vec2; 2]) -> Vec3 {
+/// Emitted radiance of a material, W/(m² sr).
+pub fn emission(scene: &Scene, material: &Material, uv: &[Vec2; 2]) -> Vec3 {
     match &material.emissive_texture {
         Some(texture) if material.emissive_factor != Vec3::ZERO => {
             material.emissive_factor * sample(scene, texture, uv, Encoding::Srgb).truncate()

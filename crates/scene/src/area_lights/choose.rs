@@ -1,0 +1,146 @@
+//! Which light to look at.
+
+use std::f32::consts::{FRAC_PI_2, PI};
+
+use glam::Vec3;
+
+use super::{AreaLights, luminance, shape::Shape};
+
+/// How the light of a sample is picked.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pick {
+    /// All alike.
+    Uniform,
+    /// In proportion to their power, wherever one is ([Stadlbauer2023]'s).
+    Power,
+    /// In proportion to an estimate of the irradiance that would arrive at the place if nothing stood between; 0 only for lights that
+    /// cannot arrive.
+    #[default]
+    Fluence,
+}
+
+/// Picks lights for one place. Made once and aimed at one place after the other.
+#[derive(Clone, Debug, Default)]
+pub struct Chooser {
+    pick: Pick,
+    /// Running sums of weights, one a light; [`Pick::Power`] keeps none.
+    sums: Vec<f32>,
+}
+
+impl Chooser {
+    /// One that picks so. Aim it before it is used.
+    pub fn new(pick: Pick) -> Chooser {
+        Chooser { pick, sums: Vec::new() }
+    }
+
+    /// Prepares for samples at a place on a surface with that unit normal; a zero normal is a place in the open, which sees all around.
+    pub fn aim(&mut self, lights: &AreaLights<'_>, position_world: Vec3, normal_world: Vec3) {
+        self.sums.clear();
+        let mut sum = 0.0f32;
+        match self.pick {
+            Pick::Power => {}
+            Pick::Uniform => self.sums.extend((1..=lights.len()).map(|n| n as f32)),
+            Pick::Fluence => self.sums.extend((0..lights.len()).map(|i| {
+                sum += lights.arriving(i, position_world, normal_world);
+                sum
+            })),
+        }
+    }
+
+    /// Probability of picking a light.
+    pub fn probability(&self, lights: &AreaLights<'_>, light: usize) -> f32 {
+        let sums = self.sums(&lights.power);
+        let Some(total) = sums.last().filter(|t| **t > 0.0) else { return 0.0 };
+        weight_of(sums, light) / total
+    }
+
+    fn sums<'s>(&'s self, power: &'s [f32]) -> &'s [f32] {
+        if self.pick == Pick::Power { power } else { &self.sums }
+    }
+
+    /// The light that `u` in `[0, 1)` picks, its probability, and what is left of `u`, again in `[0, 1)`.
+    pub(super) fn choose(&self, power: &[f32], u: f32) -> Option<(u32, f32, f32)> {
+        let sums = self.sums(power);
+        let total = *sums.last().filter(|t| **t > 0.0 && t.is_finite())?;
+        let at = u.clamp(0.0, 1.0) * total;
+        let mut light = sums.partition_point(|sum| *sum <= at);
+        if light == sums.len() {
+            // Rounded up to the end: the last that has weight.
+            light = sums.partition_point(|sum| *sum < total);
+        }
+        let weight = weight_of(sums, light);
+        let rest = ((at - (sums[light] - weight)) / weight).clamp(0.0, ONE_BELOW);
+        Some((light as u32, weight / total, rest))
+    }
+}
+
+/// Largest number below 1.
+const ONE_BELOW: f32 = 1.0 - f32::EPSILON / 2.0;
+
+fn weight_of(sums: &[f32], light: usize) -> f32 {
+    match (sums.get(light), light.checked_sub(1).and_then(|before| sums.get(before))) {
+        (Some(sum), Some(before)) => sum - before,
+        (Some(sum), None) => *sum,
+        _ => 0.0,
+    }
+}
+
+impl AreaLights<'_> {
+    /// Estimate of the irradiance (luminance, W/m²) of a light at a place if nothing stands between: what its ball or plane would
+    /// give, with cosines at the most that its extent allows. Greater than 0 wherever any of it can arrive.
+    pub fn arriving(&self, light: usize, position_world: Vec3, normal_world: Vec3) -> f32 {
+        let Some(l) = self.lights.get(light) else {
+            return self.environment.map_or(0.0, |(_, mean, _)| PI * luminance(mean).max(0.0));
+        };
+        let radiance = luminance(l.radiance).max(0.0);
+        let (center, radius) = l.shape.ball();
+        if radius <= 0.0 || radiance <= 0.0 {
+            return 0.0;
+        }
+        let offset = center - position_world;
+        let distance2 = offset.length_squared();
+        if !distance2.is_finite() {
+            return 0.0;
+        }
+        let distance = distance2.sqrt();
+        // Largest cosine of the surface's normal to a direction within the ball; 1 inside it, 0 below the horizon.
+        let cosine = |normal: Vec3, to: Vec3| {
+            if normal == Vec3::ZERO || distance <= radius {
+                return 1.0;
+            }
+            let angle = libm::acosf((normal.dot(to) / distance).clamp(-1.0, 1.0));
+            let spread = libm::asinf((radius / distance).min(1.0));
+            let nearest = (angle - spread).max(0.0);
+            if nearest >= FRAC_PI_2 { 0.0 } else { libm::cosf(nearest) }
+        };
+        let on_surface = cosine(normal_world, offset);
+        if on_surface <= 0.0 {
+            return 0.0;
+        }
+        let solid_angle = match &l.shape {
+            Shape::Nothing => 0.0,
+            Shape::Sphere { .. } if distance <= radius => 0.0,
+            Shape::Sphere { .. } => {
+                let sin2 = radius * radius / distance2;
+                2.0 * PI * sin2 / (1.0 + (1.0 - sin2).max(0.0).sqrt())
+            }
+            Shape::Disc { normal, .. } | Shape::Rectangle { normal, .. } => {
+                let height = -normal.dot(offset);
+                let facing = if l.two_sided { height.abs() } else { height };
+                // Of the plane itself: behind it nothing arrives.
+                if facing <= 0.0 {
+                    return 0.0;
+                }
+                let area = l.shape.area();
+                area * cosine(*normal * if height < 0.0 { -1.0 } else { 1.0 }, -offset)
+                    / (distance2 + area / PI)
+            }
+            // Seen from outside, bodies show a quarter of their surface (Cauchy).
+            Shape::Triangles(_) => {
+                let area = l.shape.area() * if l.two_sided { 0.5 } else { 0.25 };
+                area / (distance2 + area / PI)
+            }
+        };
+        radiance * solid_angle.min(2.0 * PI) * on_surface
+    }
+}
