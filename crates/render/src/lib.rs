@@ -36,6 +36,7 @@ pub mod sao;
 pub mod screen_space;
 pub mod sdao;
 pub mod shade;
+pub mod slc;
 pub mod ssao;
 pub mod upsample;
 

@@ -4,6 +4,7 @@
 //! pose(now) ─► tracer ─► updater (what changed) ─► publisher ─► frames for every subscriber
 //! ```
 
+pub mod cones;
 pub mod paper;
 mod population;
 pub mod shards;

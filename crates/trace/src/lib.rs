@@ -12,6 +12,7 @@ pub mod inside;
 pub mod psao;
 pub mod rtao;
 pub mod sampling;
+pub mod slc;
 
 #[cfg(test)]
 mod test_support;

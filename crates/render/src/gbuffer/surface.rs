@@ -90,6 +90,13 @@ impl GBuffer {
         Some(Found::new(scene, sample)?.geometric_normal(&corners, Mat3::from(world_from_mesh.matrix3)))
     }
 
+    /// [`Surface::position_world`] alone, cheaper; `None` as in [`GBuffer::surface`].
+    pub(crate) fn position_world(&self, scene: &Scene, pose: &Pose, sample_index: usize) -> Option<Vec3> {
+        let sample = self.samples.get(sample_index).filter(|s| s.is_covered())?;
+        let corners = world_triangle(scene, pose, sample.instance as usize, sample.triangle as usize)?;
+        Some(blend(corners, Found::new(scene, sample)?.weights))
+    }
+
     /// Rest position and normal of the surface that a sample sees; `None` as in [`GBuffer::surface`].
     pub fn surface_rest(&self, scene: &Scene, sample_index: usize) -> Option<RestSurface> {
         let sample = self.samples.get(sample_index).filter(|s| s.is_covered())?;

@@ -1,6 +1,6 @@
 //! Which light to look at.
 
-use std::f32::consts::{FRAC_PI_2, PI};
+use std::f32::consts::PI;
 
 use glam::Vec3;
 
@@ -108,10 +108,14 @@ impl AreaLights<'_> {
             if normal == Vec3::ZERO || distance <= radius {
                 return 1.0;
             }
-            let angle = libm::acosf((normal.dot(to) / distance).clamp(-1.0, 1.0));
-            let spread = libm::asinf((radius / distance).min(1.0));
-            let nearest = (angle - spread).max(0.0);
-            if nearest >= FRAC_PI_2 { 0.0 } else { libm::cosf(nearest) }
+            let cos_angle = (normal.dot(to) / distance).clamp(-1.0, 1.0);
+            let sin_spread = radius / distance;
+            let cos_spread = (1.0 - sin_spread * sin_spread).max(0.0).sqrt();
+            if cos_angle >= cos_spread {
+                return 1.0;
+            }
+            // Cosine of the difference of the two angles.
+            (cos_angle * cos_spread + (1.0 - cos_angle * cos_angle).max(0.0).sqrt() * sin_spread).max(0.0)
         };
         let on_surface = cosine(normal_world, offset);
         if on_surface <= 0.0 {

@@ -1,0 +1,201 @@
+//! Direct light of area lights for all viewers: the on-surface cache of light cones, one step a frame ([Stadlbauer2023] sec. 2.1).
+//!
+//! ```text
+//! what viewers see ─► requests ─► cache: queue, places ─► what changed ─► rays ─► entries, for every viewer's shading
+//! ```
+
+use std::sync::Arc;
+
+use dapple_scene::area_lights::{AreaLights, Environment};
+use dapple_scene::glam::Vec3;
+use dapple_scene::{Pose, Scene};
+use dapple_store::charts::{ChartParams, ChartSet, InstanceKey, SceneCharts};
+use dapple_store::cones::{
+    BoundingEntry, CacheParams, Charting, ConeCache, ConeEntry, ConeError, EntryId, LookUp, MomentEntry,
+    Requests, UpdateQueue, View,
+};
+use dapple_trace::Tracer;
+use dapple_trace::slc::{Changes, EntryPlaces, Moment, SlcCounts};
+
+/// Edge of a chart's texels, metres, at level 0. Texels of the cache are up to 64 times finer.
+pub const CHART_TEXEL_M: f32 = 0.05;
+
+/// The charts that all ends of a scene lay cones on: one set for all instances of equal mesh and rest space. Instances that carry no
+/// light (`receives`), and those whose charts cannot be made, have none; the latter come with the reason.
+pub fn cone_charts(scene: &Scene) -> (Charting, Vec<String>) {
+    let key = |instance: &dapple_scene::Instance| {
+        instance.receives.then_some(InstanceKey {
+            mesh: instance.mesh,
+            rest_from_mesh: instance.rest_from_mesh,
+            texel_m: CHART_TEXEL_M,
+        })
+    };
+    let plan = SceneCharts::plan(scene.instances.iter().map(key));
+    let defaults = ChartParams { texel_m: CHART_TEXEL_M, ..ChartParams::for_spacing(CHART_TEXEL_M, false) };
+    let mut problems = Vec::new();
+    let sets: Vec<Option<Arc<ChartSet>>> = plan
+        .sets()
+        .iter()
+        .map(|key| {
+            let mesh = &scene.meshes[key.mesh as usize];
+            match ChartSet::new(&key.positions_rest(&mesh.positions), &mesh.triangles, &key.params(&defaults))
+            {
+                Ok(charts) => Some(Arc::new(charts)),
+                Err(error) => {
+                    problems.push(format!("mesh {}: {error}", mesh.name));
+                    None
+                }
+            }
+        })
+        .collect();
+    let of_instance = (0..scene.instances.len())
+        .map(|i| plan.set_index_of_instance(i).and_then(|set| sets[set as usize].clone()));
+    (Charting::new(of_instance.collect()), problems)
+}
+
+/// Keeps the cones that viewers need.
+pub struct ConeServer<E> {
+    cache: ConeCache<E>,
+    look_up: LookUp,
+    queue: UpdateQueue,
+    places: EntryPlaces,
+    before: Option<Pose>,
+}
+
+/// What a step did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ConeStep {
+    /// Texels that viewers need, each once.
+    pub wanted: u64,
+    /// Of those, entries made in this step.
+    pub new: u64,
+    /// Texels that there was no memory for, counted once a tile of pixels.
+    pub refused: u64,
+    /// What the rays did.
+    pub counts: SlcCounts,
+}
+
+/// A scene as it is now, ready to be traced.
+#[derive(Clone, Copy)]
+pub struct Now<'a> {
+    /// What it is of.
+    pub scene: &'a Scene,
+    /// When.
+    pub pose: &'a Pose,
+    /// Of the scene in the pose.
+    pub tracer: &'a Tracer,
+    /// Light from all around.
+    pub environment: Option<&'a Environment>,
+}
+
+impl<'a> Now<'a> {
+    fn lights(&self, pose: &Pose) -> AreaLights<'a> {
+        let lights = AreaLights::new(self.scene, pose);
+        match self.environment {
+            Some(environment) => lights.with_environment(environment, pose),
+            None => lights,
+        }
+    }
+}
+
+/// How a kind of entry is brought up to date with rays.
+pub trait Update: ConeEntry {
+    /// Its settings.
+    type Params: Sync;
+
+    /// Updates the entries of a queue.
+    fn update(
+        cache: &mut ConeCache<Self>,
+        queue: &UpdateQueue,
+        places: &EntryPlaces,
+        tracer: &Tracer,
+        changes: &Changes<'_>,
+        params: &Self::Params,
+    ) -> SlcCounts;
+}
+
+impl Update for MomentEntry {
+    type Params = dapple_trace::slc::SlcParams;
+
+    fn update(
+        cache: &mut ConeCache<Self>,
+        queue: &UpdateQueue,
+        places: &EntryPlaces,
+        tracer: &Tracer,
+        changes: &Changes<'_>,
+        params: &Self::Params,
+    ) -> SlcCounts {
+        dapple_trace::slc::update_moment_cones(cache, queue, places, tracer, changes, params)
+    }
+}
+
+impl Update for BoundingEntry {
+    type Params = dapple_trace::slc::PaperParams;
+
+    fn update(
+        cache: &mut ConeCache<Self>,
+        queue: &UpdateQueue,
+        places: &EntryPlaces,
+        tracer: &Tracer,
+        changes: &Changes<'_>,
+        params: &Self::Params,
+    ) -> SlcCounts {
+        dapple_trace::slc::update_bounding_cones(cache, queue, places, tracer, changes, params)
+    }
+}
+
+impl<E: Update> ConeServer<E> {
+    /// Without entries.
+    ///
+    /// # Errors
+    /// A parameter out of range.
+    pub fn new(cache: CacheParams, look_up: LookUp) -> Result<ConeServer<E>, ConeError> {
+        look_up.check()?;
+        Ok(ConeServer {
+            cache: ConeCache::new(cache)?,
+            look_up,
+            queue: UpdateQueue::default(),
+            places: EntryPlaces::default(),
+            before: None,
+        })
+    }
+
+    /// Brings what the viewers see up to date. `pass` is called with the name of each stage after it: `requests`, `queue`, `places`, `rays`.
+    pub fn step(
+        &mut self,
+        now: &Now<'_>,
+        views: &[View<'_>],
+        params: &E::Params,
+        pass: &mut dyn FnMut(&'static str),
+    ) -> ConeStep {
+        let requests = Requests::gather(views, &self.look_up);
+        pass("requests");
+        self.queue = self.cache.admit(&requests);
+        pass("queue");
+        let before = self.before.as_ref().unwrap_or(now.pose);
+        self.places = EntryPlaces::of(&self.cache, &self.queue, now.scene, before, now.pose);
+        pass("places");
+        let (lights, lights_before) = (now.lights(now.pose), now.lights(before));
+        let then = Moment { scene: now.scene, pose: before, lights: &lights_before };
+        let changes = Changes::between(&then, &Moment { pose: now.pose, lights: &lights, ..then });
+        let counts = E::update(&mut self.cache, &self.queue, &self.places, now.tracer, &changes, params);
+        pass("rays");
+        self.before = Some(now.pose.clone());
+        ConeStep {
+            wanted: self.queue.texels.len() as u64,
+            new: self.queue.texels.iter().filter(|texel| texel.is_new).count() as u64,
+            refused: u64::from(self.queue.refused),
+            counts,
+        }
+    }
+
+    /// All entries.
+    pub fn cache(&self) -> &ConeCache<E> {
+        &self.cache
+    }
+
+    /// Position and unit normal, in the world, of an entry that was wanted in the last step.
+    pub fn place_of(&self, id: EntryId) -> Option<(Vec3, Vec3)> {
+        self.places.of_entry(id).map(|place| (place.position_world, place.normal_world))
+    }
+}

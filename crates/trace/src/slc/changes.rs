@@ -1,0 +1,190 @@
+//! What changed between two moments, and for how much of an entry's light: a server knows its movers.
+
+use dapple_scene::area_lights::AreaLights;
+use dapple_scene::glam::Vec3;
+use dapple_scene::{Pose, Scene};
+use dapple_store::cones::{MomentEntry, ReAim};
+
+use super::EntryPlace;
+
+/// A scene at one moment, with its lights.
+#[derive(Clone, Copy)]
+pub struct Moment<'a> {
+    /// What it is of.
+    pub scene: &'a Scene,
+    /// When.
+    pub pose: &'a Pose,
+    /// [`AreaLights::new`] of both.
+    pub lights: &'a AreaLights<'a>,
+}
+
+/// Two moments of a scene, compared.
+pub struct Changes<'a> {
+    now: &'a AreaLights<'a>,
+    before: &'a AreaLights<'a>,
+    /// A light each: moved, or shines differently.
+    lights: Vec<bool>,
+    /// An instance each: moved or bent.
+    moved: Vec<bool>,
+    /// Balls about what casts and moved, where it was and where it is, with the instance.
+    movers: Vec<(Vec3, f32, u32)>,
+    nothing: bool,
+}
+
+/// What changed for one entry.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Change {
+    /// Part of the light that would arrive unoccluded which is of lights that changed or may have been hidden or uncovered, 0 … 1.
+    pub(super) share: f32,
+    /// Whether something moved in front of a light, or the entry itself moved.
+    pub(super) hidden: bool,
+}
+
+impl<'a> Changes<'a> {
+    /// Of a scene from one moment to the next. Nothing changes if both are the same.
+    pub fn between(before: &Moment<'a>, now: &Moment<'a>) -> Changes<'a> {
+        let lights = now.lights.changed_since(before.lights);
+        let count = now.scene.instances.len();
+        let mut moved = vec![false; count];
+        let mut movers = Vec::new();
+        for (i, moved) in moved.iter_mut().enumerate() {
+            let (Some(then), Some(posed)) = (before.pose.instances.get(i), now.pose.instances.get(i)) else {
+                continue;
+            };
+            let bent = match (&then.deformed, &posed.deformed) {
+                (None, None) => false,
+                (Some(a), Some(b)) => !std::sync::Arc::ptr_eq(a, b) && a.positions != b.positions,
+                _ => true,
+            };
+            *moved = bent || then.world_from_mesh != posed.world_from_mesh;
+            if *moved && now.scene.instances[i].casts {
+                let bounds = now
+                    .scene
+                    .instance_bounds_world(before.pose, i)
+                    .union(now.scene.instance_bounds_world(now.pose, i));
+                if !bounds.is_empty() {
+                    movers.push((bounds.center(), 0.5 * bounds.diagonal(), i as u32));
+                }
+            }
+        }
+        let nothing = !lights.contains(&true) && !moved.contains(&true);
+        Changes { now: now.lights, before: before.lights, lights, moved, movers, nothing }
+    }
+
+    /// The lights as they are now.
+    pub fn lights(&self) -> &'a AreaLights<'a> {
+        self.now
+    }
+
+    /// Whether nothing changed at all.
+    pub fn is_nothing(&self) -> bool {
+        self.nothing
+    }
+
+    /// Which lights moved or shine differently.
+    pub fn changed_lights(&self) -> &[bool] {
+        &self.lights
+    }
+
+    pub(super) fn of(&self, place: &EntryPlace, instance: u32) -> Change {
+        if self.nothing {
+            return Change::default();
+        }
+        if self.moved.get(instance as usize).is_some_and(|moved| *moved) {
+            return Change { share: 1.0, hidden: true };
+        }
+        let (position, normal) = (place.position_world, place.normal_world);
+        let (mut all, mut part, mut hidden) = (0.0, 0.0, false);
+        for light in 0..self.now.len() {
+            let mut energy = self.now.arriving(light, position, normal);
+            let changed = self.lights[light];
+            if changed {
+                energy = energy.max(self.before.arriving(light, position, normal));
+            }
+            if energy <= 0.0 {
+                continue;
+            }
+            all += energy;
+            let covered = self.covered(light, position, normal);
+            hidden |= covered > 0.0;
+            part += energy * if changed { 1.0 } else { covered };
+        }
+        Change { share: if all > 0.0 { part / all } else { 0.0 }, hidden }
+    }
+
+    /// How much of a light something may have moved in front of: all of it, or of the surroundings the part of the view that movers take.
+    fn covered(&self, light: usize, position: Vec3, normal: Vec3) -> f32 {
+        let own = self.now.instance(light);
+        let others = self.movers.iter().filter(|mover| Some(mover.2) != own);
+        match self.now.bounds(light) {
+            Some(ball) => {
+                let ball = self
+                    .before
+                    .bounds(light)
+                    .filter(|_| self.lights[light])
+                    .map_or(ball, |before| join(ball, before));
+                f32::from(others.into_iter().any(|mover| meets(position, ball, (mover.0, mover.1))))
+            }
+            None if own.is_some() => 0.0,
+            None => others
+                .map(|&(center, radius, _)| {
+                    let offset = center - position;
+                    let distance = offset.length();
+                    if normal.dot(offset) <= -radius {
+                        return 0.0;
+                    }
+                    let sine = (radius / distance.max(radius)).min(1.0);
+                    1.0 - (1.0 - sine * sine).sqrt()
+                })
+                .sum::<f32>()
+                .min(1.0),
+        }
+    }
+}
+
+impl Change {
+    /// Turns the cones of lights that moved after them.
+    pub(super) fn re_aim(&self, entry: &mut MomentEntry, place: &EntryPlace, changes: &Changes<'_>) {
+        let moved = place.position_before_world != place.position_world
+            || place.normal_before_world != place.normal_world;
+        for (light, changed) in changes.lights.iter().enumerate() {
+            if !changed && !moved {
+                continue;
+            }
+            let (Some(then), Some(now)) = (changes.before.bounds(light), changes.now.bounds(light)) else {
+                continue;
+            };
+            let (a, b) = (then.0 - place.position_before_world, now.0 - place.position_world);
+            let (Some(from), Some(to)) = (a.try_normalize(), b.try_normalize()) else { continue };
+            let before =
+                changes.before.arriving(light, place.position_before_world, place.normal_before_world);
+            let after = changes.now.arriving(light, place.position_world, place.normal_world);
+            if before <= 0.0 || then.1 <= 0.0 {
+                continue;
+            }
+            let size_ratio = (now.1 / b.length()) / (then.1 / a.length());
+            entry.re_aim(&ReAim { light: light as u32, from, to, energy_ratio: after / before, size_ratio });
+        }
+    }
+}
+
+/// A ball that holds both.
+fn join((a, ra): (Vec3, f32), (b, rb): (Vec3, f32)) -> (Vec3, f32) {
+    let center = 0.5 * (a + b);
+    (center, (a.distance(center) + ra).max(b.distance(center) + rb))
+}
+
+/// Whether a ball may hide something of a light's ball from a place.
+fn meets(from: Vec3, (light, light_radius): (Vec3, f32), (mover, mover_radius): (Vec3, f32)) -> bool {
+    let (to_light, to_mover) = (light - from, mover - from);
+    let (d_light, d_mover) = (to_light.length(), to_mover.length());
+    if d_light <= light_radius || d_mover <= mover_radius {
+        return true;
+    }
+    if d_mover - mover_radius > d_light + light_radius {
+        return false;
+    }
+    let (s_light, s_mover) = (light_radius / d_light, mover_radius / d_mover);
+    let cosine = |sine: f32| (1.0 - sine * sine).max(0.0).sqrt();
+    to_light.dot(to_mover) >= d_light * d_mover * (cosine(s_light) * cosine(s_mover) - s_light * s_mover)
+}

@@ -1,0 +1,201 @@
+//! Light cones on surfaces, kept up to date by rays ([Stadlbauer2023] sec. 3.1): ours with moment cones, and the paper's.
+//!
+//! - takes: a [`Tracer`], [`AreaLights`] of this moment, what changed since the last ([`Changes`]), the frame's queue of a
+//!   [`ConeCache`]
+//! - returns: entries of the cache updated, and how many rays that took
+//!
+//! Equations, deviations and parameters in `README.md`.
+
+mod changes;
+mod paper;
+mod places;
+#[cfg(test)]
+mod tests;
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use dapple_scene::area_lights::{AreaLights, Chooser, Pick};
+use dapple_scene::glam::Vec3;
+use dapple_store::cones::{ConeCache, ConeSample, MomentEntry, MomentParams, UpdateQueue};
+
+use crate::bvh::{Tracer, offset_origin};
+use crate::sampling::{Sequence, hash};
+pub use changes::{Changes, Moment};
+pub use paper::{PaperParams, update_bounding_cones};
+pub use places::{EntryPlace, EntryPlaces};
+
+/// Most samples of an entry in one update.
+pub const MAX_SAMPLES: u32 = 256;
+
+/// How moment cones are updated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SlcParams {
+    /// How samples become cones.
+    pub moment: MomentParams,
+    /// Samples of an update while an entry is young, 1 … [`MAX_SAMPLES`], default 8 ([Stadlbauer2023] sec. 4).
+    pub first_samples: u32,
+    /// Updates with that many, default 8 ([Stadlbauer2023] sec. 4).
+    pub first_updates: u32,
+    /// Samples of an update after that, while nothing changes, default 1 ([Stadlbauer2023] sec. 4). None are taken once an entry stands
+    /// for [`MomentParams::max_samples`]: where nothing changes it is as good as it gets.
+    pub samples: u32,
+    /// How lights are picked, default by fluence.
+    pub pick: Pick,
+    /// Where samples lie, default a lattice that goes on through the life of an entry.
+    pub sequence: Sequence,
+    /// Whether cones of lights that moved are turned with them, before they are updated. Default.
+    pub re_aim: bool,
+    /// Seed of the samples, default 0.
+    pub seed: u64,
+}
+
+impl Default for SlcParams {
+    fn default() -> Self {
+        SlcParams {
+            moment: MomentParams::default(),
+            first_samples: 8,
+            first_updates: 8,
+            samples: 1,
+            pick: Pick::Fluence,
+            sequence: Sequence::Lattice,
+            re_aim: true,
+            seed: 0,
+        }
+    }
+}
+
+/// What an update took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SlcCounts {
+    /// Entries that took samples.
+    pub updated: u64,
+    /// Shadow rays.
+    pub rays: u64,
+    /// Entries to which something changed since the last moment.
+    pub changed: u64,
+}
+
+/// Confidence that an entry keeps of which a light moved or was hidden, times the root of that light's share: with cones that are turned
+/// after the light, and without.
+const KEPT_RE_AIMED: f32 = 24.0;
+const KEPT: f32 = 8.0;
+/// A share of an entry's light below which a change is not worth rays.
+const LEAST_SHARE: f32 = 0.01;
+
+/// Updates the entries of a frame's queue, in parallel in the caller's rayon pool. `places` are of the queue
+/// ([`EntryPlaces::of`]). What comes out depends on the arguments alone.
+///
+/// Directions of cones are in world space: where a receiver turns, the light about it does not.
+pub fn update_moment_cones(
+    cache: &mut ConeCache<MomentEntry>,
+    queue: &UpdateQueue,
+    places: &EntryPlaces,
+    tracer: &Tracer,
+    changes: &Changes<'_>,
+    params: &SlcParams,
+) -> SlcCounts {
+    let (rays, changed) = (AtomicU64::new(0), AtomicU64::new(0));
+    let lights = changes.lights();
+    let SlcParams { pick, sequence, seed, .. } = *params;
+    let source = Source { pick, sequence, seed, with_cosine: true };
+    let updated = cache.update(queue, |index, texel, entry| {
+        let (Some(place), false) = (places.get(index), lights.is_empty()) else { return false };
+        let change = changes.of(place, texel.instance);
+        let mut count = quiet_samples(entry, params);
+        if change.share > LEAST_SHARE {
+            changed.fetch_add(1, Ordering::Relaxed);
+            let root = change.share.sqrt();
+            if params.re_aim {
+                change.re_aim(entry, place, changes);
+            }
+            let kept = if params.re_aim && !change.hidden { KEPT_RE_AIMED } else { KEPT };
+            entry.cut_confidence((kept / root).min(4095.0) as u16);
+            count = count.max(libm::ceilf(params.first_samples as f32 * root) as u32);
+        }
+        let count = count.min(MAX_SAMPLES);
+        if count == 0 {
+            return false;
+        }
+        let mut samples = Vec::with_capacity(count as usize);
+        let site = site_of(texel.instance, texel.place.triangle, texel.place.barycentrics);
+        let traced = take_samples(
+            tracer,
+            lights,
+            place,
+            &source,
+            site,
+            entry.taken()..entry.taken() + count,
+            &mut samples,
+        );
+        rays.fetch_add(traced, Ordering::Relaxed);
+        entry.update(&samples, count, &params.moment);
+        true
+    });
+    // A queue of another frame is the caller's mistake, and updates nothing.
+    let updated = updated.unwrap_or(0);
+    SlcCounts { updated, rays: rays.into_inner(), changed: changed.into_inner() }
+}
+
+/// Samples of an entry about which nothing changed.
+fn quiet_samples(entry: &MomentEntry, params: &SlcParams) -> u32 {
+    let most = params.moment.max_samples;
+    if u32::from(entry.samples()) < (params.first_samples * params.first_updates).min(u32::from(most)) {
+        params.first_samples
+    } else if entry.samples() < most {
+        params.samples
+    } else {
+        0
+    }
+}
+
+/// Names a place on a surface, for its random numbers.
+fn site_of(instance: u32, triangle: u32, [v, w]: [f32; 2]) -> u64 {
+    let place = u64::from(v.to_bits()) << 32 | u64::from(w.to_bits());
+    u64::from(hash(place, u64::from(triangle), instance)) << 32
+        | u64::from(hash(place, u64::from(instance), triangle))
+}
+
+/// Where samples of light come from, and what they are.
+struct Source {
+    pick: Pick,
+    sequence: Sequence,
+    seed: u64,
+    /// Irradiance, or fluence.
+    with_cosine: bool,
+}
+
+/// Sends rays to lights: the samples that reached one. Tells how many rays were needed.
+fn take_samples(
+    tracer: &Tracer,
+    lights: &AreaLights<'_>,
+    place: &EntryPlace,
+    source: &Source,
+    site: u64,
+    indices: std::ops::Range<u32>,
+    samples: &mut Vec<ConeSample>,
+) -> u64 {
+    let (position, normal) = (place.position_world, place.normal_world);
+    let mut chooser = Chooser::new(source.pick);
+    chooser.aim(lights, position, normal);
+    let mut reaches: Vec<Vec3> = Vec::with_capacity(indices.len());
+    for i in indices {
+        let Some(sample) = lights.sample(&chooser, position, source.sequence.place(source.seed, site, i))
+        else {
+            continue;
+        };
+        let cosine = normal.dot(sample.to_light_world);
+        if cosine > 0.0 {
+            let factor = if source.with_cosine { cosine } else { 1.0 };
+            let value = sample.radiance * (factor / sample.density_per_sr);
+            samples.push(ConeSample { direction: sample.to_light_world, value, light: sample.light });
+            reaches.push(sample.reach());
+        }
+    }
+    let blocked = tracer.occlusion(offset_origin(position, normal), &reaches, 1.0);
+    let mut i = 0;
+    samples.retain(|_| {
+        i += 1;
+        blocked[(i - 1) / 64] >> ((i - 1) % 64) & 1 == 0
+    });
+    reaches.len() as u64
+}

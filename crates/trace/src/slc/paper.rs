@@ -1,0 +1,124 @@
+//! The paper's update of bounding cones ([Stadlbauer2023] sec. 3.1): samples, then a probe at the rim of every cone.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use dapple_scene::area_lights::{AreaLights, Pick};
+use dapple_scene::glam::Vec3;
+use dapple_store::cones::{BoundingEntry, BoundingParams, ConeCache, Probe, UpdateQueue};
+
+use super::{Changes, EntryPlaces, MAX_SAMPLES, SlcCounts, Source, site_of, take_samples};
+use crate::bvh::{Ray, Tracer, offset_origin};
+use crate::sampling::{Sequence, hash, unit_interval};
+
+/// How bounding cones are updated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PaperParams {
+    /// How samples and probes change cones.
+    pub bounding: BoundingParams,
+    /// Samples of an update while an entry is young or changes, 1 … [`MAX_SAMPLES`], default 8 (sec. 4).
+    pub first_samples: u32,
+    /// Updates with that many, default 8 (sec. 4). An entry whose confidence falls below them, because its cones turn, gets them again.
+    pub first_updates: u32,
+    /// Samples of an update after that, default 1 (sec. 4).
+    pub samples: u32,
+    /// Whether rims are probed. Default true.
+    pub probes: bool,
+    /// How lights are picked, default by power (sec. 3.1).
+    pub pick: Pick,
+    /// Where samples lie, default anywhere.
+    pub sequence: Sequence,
+    /// Seed of samples and probes, default 0.
+    pub seed: u64,
+}
+
+impl Default for PaperParams {
+    fn default() -> Self {
+        PaperParams {
+            bounding: BoundingParams::default(),
+            first_samples: 8,
+            first_updates: 8,
+            samples: 1,
+            probes: true,
+            pick: Pick::Power,
+            sequence: Sequence::Random,
+            seed: 0,
+        }
+    }
+}
+
+/// Updates the entries of a frame's queue, in parallel in the caller's rayon pool; fluence, by all of sec. 3.1. It knows of changes
+/// only what its cones show.
+pub fn update_bounding_cones(
+    cache: &mut ConeCache<BoundingEntry>,
+    queue: &UpdateQueue,
+    places: &EntryPlaces,
+    tracer: &Tracer,
+    changes: &Changes<'_>,
+    params: &PaperParams,
+) -> SlcCounts {
+    let rays = AtomicU64::new(0);
+    let lights = changes.lights();
+    let shines = Shines::of(lights);
+    let PaperParams { pick, sequence, seed, .. } = *params;
+    let source = Source { pick, sequence, seed, with_cosine: false };
+    let updated = cache.update(queue, |index, texel, entry| {
+        let (Some(place), false) = (places.get(index), lights.is_empty()) else { return false };
+        let young = u32::from(entry.samples()) < params.first_samples * params.first_updates;
+        let count = if young { params.first_samples } else { params.samples }.min(MAX_SAMPLES);
+        let site = site_of(texel.instance, texel.place.triangle, texel.place.barycentrics);
+        let taken = entry.taken();
+        let mut samples = Vec::with_capacity(count as usize);
+        let mut traced =
+            take_samples(tracer, lights, place, &source, site, taken..taken + count, &mut samples);
+        let mut cycle = entry.update(&samples, count, &params.bounding);
+        if params.probes {
+            let origin_world = offset_origin(place.position_world, place.normal_world);
+            let probes: Vec<Probe> = (0..entry.cones().len())
+                .filter_map(|cone| {
+                    let turn = unit_interval(hash(seed ^ PROBES, site, taken.wrapping_mul(8) + cone as u32));
+                    let direction = entry.probe_direction(cone, turn, &params.bounding)?;
+                    let ray = Ray { origin_world, direction_world: direction, t_max: f32::INFINITY };
+                    let hit = place.normal_world.dot(direction) > 0.0 && shines.meets(tracer, lights, &ray);
+                    Some(Probe { cone, direction, hit })
+                })
+                .collect();
+            traced += probes.len() as u64;
+            entry.probe(&probes, &params.bounding, &mut cycle);
+        }
+        rays.fetch_add(traced, Ordering::Relaxed);
+        true
+    });
+    SlcCounts { updated: updated.unwrap_or(0), rays: rays.into_inner(), changed: 0 }
+}
+
+/// Keeps probes' random numbers apart from those of samples.
+const PROBES: u64 = 0x70_726f_6265;
+
+/// Which instances are lights.
+struct Shines {
+    of_instance: Vec<bool>,
+}
+
+impl Shines {
+    fn of(lights: &AreaLights<'_>) -> Shines {
+        let mut of_instance = Vec::new();
+        for light in 0..lights.len() {
+            let Some(instance) = lights.instance(light).map(|i| i as usize) else { continue };
+            if lights.power_of(light) > 0.0 {
+                of_instance.resize(of_instance.len().max(instance + 1), false);
+                of_instance[instance] = true;
+            }
+        }
+        Shines { of_instance }
+    }
+
+    /// Whether a ray ends at a light.
+    fn meets(&self, tracer: &Tracer, lights: &AreaLights<'_>, ray: &Ray) -> bool {
+        match tracer.closest_hit(ray) {
+            Some(hit) => {
+                self.of_instance.get(hit.instance as usize).is_some_and(|shines| *shines) && !hit.back_face
+            }
+            None => lights.environment().is_some_and(|sky| sky.radiance(ray.direction_world) != Vec3::ZERO),
+        }
+    }
+}
