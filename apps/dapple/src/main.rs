@@ -7,6 +7,7 @@ mod args;
 mod bake;
 mod bench;
 mod demo;
+mod direct_light;
 mod eval;
 mod exr_file;
 mod file;

@@ -8,6 +8,7 @@
 //! give the same bits on any number of threads.
 
 pub mod bvh;
+pub mod direct;
 pub mod inside;
 pub mod psao;
 pub mod rtao;

@@ -28,32 +28,6 @@ pub fn unit_interval(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / (1 << 24) as f32)
 }
 
-/// Where the samples of a site lie in the unit cube.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Sequence {
-    /// Each anywhere, independently.
-    Random,
-    /// Points of the lattice of the generalised golden ratio, moved by the site: spread evenly, whatever part of the endless sequence
-    /// is taken (\[Roberts2018\], "The Unreasonable Effectiveness of Quasirandom Sequences").
-    #[default]
-    Lattice,
-}
-
-impl Sequence {
-    /// The place of a site's sample, each coordinate in `[0, 1)`.
-    pub fn place(self, seed: u64, site: u64, sample: u32) -> [f32; 3] {
-        // 2³² over g, g², g³, where g⁴ = g + 1.
-        const STEPS: [u32; 3] = [3_518_319_155, 2_882_110_345, 2_360_945_575];
-        match self {
-            Sequence::Random => [0, 1, 2].map(|k| unit_interval(hash(seed.wrapping_add(k), site, sample))),
-            Sequence::Lattice => [0u32, 1, 2].map(|k| {
-                let step = STEPS[k as usize].wrapping_mul(sample);
-                unit_interval(hash(seed, site, k).wrapping_add(step))
-            }),
-        }
-    }
-}
-
 /// A unit direction around +Z with density cos θ / π, from `u` in `[0, 1)²`: `u[0]` is sin² θ, `u[1]` the turn about Z.
 pub fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
     let (sin, cos) = sin_cos_turns(u[1]);

@@ -38,6 +38,8 @@ pub(super) struct Change {
     pub(super) share: f32,
     /// Whether something moved in front of a light, or the entry itself moved.
     pub(super) hidden: bool,
+    /// Part of the light that was not there before, 0 … 1.
+    pub(super) new: f32,
 }
 
 impl<'a> Changes<'a> {
@@ -91,10 +93,10 @@ impl<'a> Changes<'a> {
             return Change::default();
         }
         if self.moved.get(instance as usize).is_some_and(|moved| *moved) {
-            return Change { share: 1.0, hidden: true };
+            return Change { share: 1.0, hidden: true, new: 0.0 };
         }
         let (position, normal) = (place.position_world, place.normal_world);
-        let (mut all, mut part, mut hidden) = (0.0, 0.0, false);
+        let (mut all, mut part, mut new, mut hidden) = (0.0, 0.0, 0.0, false);
         for light in 0..self.now.len() {
             let mut energy = self.now.arriving(light, position, normal);
             let changed = self.lights[light];
@@ -105,11 +107,15 @@ impl<'a> Changes<'a> {
                 continue;
             }
             all += energy;
+            if changed && self.before.power_of(light) <= 0.0 {
+                new += energy;
+            }
             let covered = self.covered(light, position, normal);
             hidden |= covered > 0.0;
             part += energy * if changed { 1.0 } else { covered };
         }
-        Change { share: if all > 0.0 { part / all } else { 0.0 }, hidden }
+        let of_all = |energy: f32| if all > 0.0 { energy / all } else { 0.0 };
+        Change { share: of_all(part), hidden, new: of_all(new) }
     }
 
     /// How much of a light something may have moved in front of: all of it, or of the surroundings the part of the view that movers take.
@@ -151,14 +157,16 @@ impl Change {
             if !changed && !moved {
                 continue;
             }
-            let (Some(then), Some(now)) = (changes.before.bounds(light), changes.now.bounds(light)) else {
-                continue;
-            };
+            let Some(then) = changes.before.bounds(light) else { continue };
+            let gone = changes.now.bounds(light).is_none();
+            let now = changes.now.bounds(light).unwrap_or(then);
             let (a, b) = (then.0 - place.position_before_world, now.0 - place.position_world);
             let (Some(from), Some(to)) = (a.try_normalize(), b.try_normalize()) else { continue };
-            let before =
-                changes.before.arriving(light, place.position_before_world, place.normal_before_world);
-            let after = changes.now.arriving(light, place.position_world, place.normal_world);
+            let arriving =
+                |lights: &AreaLights<'_>, position, normal| lights.arriving(light, position, normal);
+            let before = arriving(changes.before, place.position_before_world, place.normal_before_world);
+            let after =
+                if gone { 0.0 } else { arriving(changes.now, place.position_world, place.normal_world) };
             if before <= 0.0 || then.1 <= 0.0 {
                 continue;
             }

@@ -19,7 +19,8 @@ use dapple_scene::glam::Vec3;
 use dapple_store::cones::{ConeCache, ConeSample, MomentEntry, MomentParams, UpdateQueue};
 
 use crate::bvh::{Tracer, offset_origin};
-use crate::sampling::{Sequence, hash};
+use crate::direct::{Draws, Sequence};
+use crate::sampling::hash;
 pub use changes::{Changes, Moment};
 pub use paper::{PaperParams, update_bounding_cones};
 pub use places::{EntryPlace, EntryPlaces};
@@ -109,7 +110,9 @@ pub fn update_moment_cones(
                 change.re_aim(entry, place, changes);
             }
             let kept = if params.re_aim && !change.hidden { KEPT_RE_AIMED } else { KEPT };
-            entry.cut_confidence((kept / root).min(4095.0) as u16);
+            // Of a light that was not there, what the entry knows says nothing.
+            let kept = if change.new > LEAST_SHARE { kept.min(1.0 / change.new) } else { kept / root };
+            entry.cut_confidence(kept.clamp(1.0, 4095.0) as u16);
             count = count.max(libm::ceilf(params.first_samples as f32 * root) as u32);
         }
         let count = count.min(MAX_SAMPLES);
@@ -175,12 +178,12 @@ fn take_samples(
     samples: &mut Vec<ConeSample>,
 ) -> u64 {
     let (position, normal) = (place.position_world, place.normal_world);
+    let draws = Draws::new(source.sequence, source.seed, site, 0, 1);
     let mut chooser = Chooser::new(source.pick);
     chooser.aim(lights, position, normal);
     let mut reaches: Vec<Vec3> = Vec::with_capacity(indices.len());
     for i in indices {
-        let Some(sample) = lights.sample(&chooser, position, source.sequence.place(source.seed, site, i))
-        else {
+        let Some(sample) = lights.sample(&chooser, position, draws.at(i)) else {
             continue;
         };
         let cosine = normal.dot(sample.to_light_world);

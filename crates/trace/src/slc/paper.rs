@@ -8,7 +8,8 @@ use dapple_store::cones::{BoundingEntry, BoundingParams, ConeCache, Probe, Updat
 
 use super::{Changes, EntryPlaces, MAX_SAMPLES, SlcCounts, Source, site_of, take_samples};
 use crate::bvh::{Ray, Tracer, offset_origin};
-use crate::sampling::{Sequence, hash, unit_interval};
+use crate::direct::Sequence;
+use crate::sampling::{hash, unit_interval};
 
 /// How bounding cones are updated.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,1 +1,305 @@
+use std::f32::consts::{PI, TAU};
+use std::sync::Arc;
 
+use dapple_scene::area_lights::AreaLights;
+use dapple_scene::glam::{Affine3A, Vec3};
+use dapple_scene::{EmitterShape, Material, Pose, PosedInstance, Scene};
+use dapple_store::charts::{ChartParams, ChartSet};
+use dapple_store::cones::{
+    BoundingEntry, CacheParams, Charting, ConeCache, ConeEntry, LookUp, MomentEntry, PixelPlace, Requests,
+    UpdateQueue, View,
+};
+
+use super::*;
+use crate::test_support::{disc, quad, scene as placed, sphere};
+
+/// A floor of 20 m, lights over it, and 14 × 14 places a millimetre apart about its middle.
+struct Rig {
+    scene: Scene,
+    pose: Pose,
+    charting: Charting,
+    pixels: Vec<Option<PixelPlace>>,
+}
+
+const SIDE: u32 = 14;
+
+impl Rig {
+    /// Lights: mesh, shape, radiance, where.
+    fn new(lights: Vec<(dapple_scene::Mesh, EmitterShape, f32, Affine3A)>) -> Rig {
+        let at = |x, z| Vec3::new(x, 0.0, z);
+        let floor = quad(at(-10.0, 10.0), at(10.0, 10.0), at(10.0, -10.0), at(-10.0, -10.0));
+        let (mut meshes, mut maps) = (vec![floor.clone()], vec![(0, Affine3A::IDENTITY)]);
+        for (i, (mesh, _, _, world)) in (1u32..).zip(&lights) {
+            meshes.push(mesh.clone());
+            maps.push((i, *world));
+        }
+        let (mut scene, pose) = placed(meshes, &maps);
+        for (i, (_, shape, radiance, _)) in lights.iter().enumerate() {
+            scene.materials.push(Material { emissive_factor: Vec3::splat(*radiance), ..Material::default() });
+            scene.meshes[i + 1].parts[0].material = i as u32 + 1;
+            scene.instances[i + 1].emitter = *shape;
+        }
+        let params = ChartParams { texel_m: 0.05, ..ChartParams::for_spacing(0.05, false) };
+        let charts = ChartSet::new(&floor.positions, &floor.triangles, &params).unwrap();
+        let charting = Charting::new(vec![Some(Arc::new(charts))]);
+        let pixels = (0..SIDE * SIDE)
+            .map(|i| {
+                let (x, z) = ((i % SIDE) as f32 * 1e-3, 1e-3 + (i / SIDE) as f32 * 1e-3);
+                // In the first triangle, of (−10, 10), (10, 10), (10, −10).
+                let weights = [(x + 10.0) / 20.0 - (10.0 - z) / 20.0, (10.0 - z) / 20.0];
+                let place = charting.place(0, 0, weights, at(x, z), Vec3::Y)?;
+                Some(PixelPlace {
+                    instance: 0,
+                    triangle: 0,
+                    barycentrics: weights,
+                    place,
+                    footprint_m: 7.8e-4,
+                })
+            })
+            .collect();
+        Rig { scene, pose, charting, pixels }
+    }
+
+    fn queue<E: ConeEntry>(&self, cache: &mut ConeCache<E>) -> UpdateQueue {
+        let view = View { width: SIDE as usize, pixels: &self.pixels };
+        cache.admit(&Requests::gather(&[view], &LookUp { bias: 1.0, blend: false }))
+    }
+
+    /// One step from one pose to another.
+    fn step(
+        &self,
+        cache: &mut ConeCache<MomentEntry>,
+        before: &Pose,
+        now: &Pose,
+        params: &SlcParams,
+    ) -> SlcCounts {
+        let tracer = Tracer::new(&self.scene, now);
+        let queue = self.queue(cache);
+        let places = EntryPlaces::of(cache, &queue, &self.scene, before, now);
+        let [then, lights] = [before, now].map(|pose| AreaLights::new(&self.scene, pose));
+        let then = Moment { scene: &self.scene, pose: before, lights: &then };
+        let changes = Changes::between(&then, &Moment { scene: &self.scene, pose: now, lights: &lights });
+        update_moment_cones(cache, &queue, &places, &tracer, &changes, params)
+    }
+
+    fn cache(&self) -> ConeCache<MomentEntry> {
+        ConeCache::new(CacheParams::default()).unwrap()
+    }
+
+    /// As [`Rig::step`], with all entries after `steps` at rest.
+    fn settled(&self, steps: u32, params: &SlcParams) -> ConeCache<MomentEntry> {
+        let mut cache = self.cache();
+        for _ in 0..steps {
+            self.step(&mut cache, &self.pose, &self.pose, params);
+        }
+        cache
+    }
+}
+
+/// Mean irradiance of all entries.
+fn mean(cache: &ConeCache<MomentEntry>) -> f32 {
+    let all: Vec<f32> = cache.ids().map(|id| cache.entry(id).unwrap().energy().x).collect();
+    assert!(all.len() >= 150, "{}", all.len());
+    all.iter().sum::<f32>() / all.len() as f32
+}
+
+fn over(height: f32) -> Affine3A {
+    Affine3A::from_translation(Vec3::Y * height)
+}
+
+/// Faces down.
+fn downward(mesh: dapple_scene::Mesh) -> dapple_scene::Mesh {
+    let mut mesh = mesh;
+    mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    mesh
+}
+
+fn rectangle(a: f32, b: f32) -> dapple_scene::Mesh {
+    let at = |x, z| Vec3::new(x, 0.0, z);
+    downward(quad(at(-a, b), at(a, b), at(a, -b), at(-a, -b)))
+}
+
+/// A rectangle of 2a × 2b over its middle, at height 1.
+fn rectangle_exact(a: f32, b: f32) -> f32 {
+    let (p, q) = ((1.0 + a * a).sqrt(), (1.0 + b * b).sqrt());
+    4.0 * PI * (a / p * (b / p).atan() + b / q * (a / q).atan()) / TAU
+}
+
+#[track_caller]
+fn assert_near(found: f32, exact: f32, tolerance: f32) {
+    assert!((found - exact).abs() <= tolerance * exact, "{found}, exactly {exact}");
+}
+
+#[test]
+fn entries_have_the_irradiance_of_closed_forms() {
+    let ball = |at: Vec3| {
+        (sphere(Vec3::ZERO, 0.5, 16, 24), EmitterShape::Sphere, 10.0, Affine3A::from_translation(at))
+    };
+    let tilted = 75f32.to_radians();
+    for (light, exact) in [
+        (ball(Vec3::Y * 2.0), 10.0 * PI / 16.0),
+        (ball(Vec3::new(2.0 * tilted.sin(), 2.0 * tilted.cos(), 0.0)), 10.0 * PI / 16.0 * tilted.cos()),
+        ((downward(disc(Vec3::ZERO, 1.0, 64)), EmitterShape::Disc, 10.0, over(1.0)), 10.0 * PI / 2.0),
+        ((rectangle(2.5, 1.0), EmitterShape::Rectangle, 10.0, over(1.0)), 10.0 * rectangle_exact(2.5, 1.0)),
+        ((rectangle(2.5, 1.0), EmitterShape::Triangles, 10.0, over(1.0)), 10.0 * rectangle_exact(2.5, 1.0)),
+    ] {
+        let rig = Rig::new(vec![light]);
+        let cache = rig.settled(40, &SlcParams::default());
+        assert_near(mean(&cache), exact, 0.01);
+    }
+}
+
+#[test]
+fn the_papers_cones_keep_all_energy_but_what_they_discard() {
+    let rig = Rig::new(vec![(sphere(Vec3::ZERO, 0.5, 16, 24), EmitterShape::Sphere, 10.0, over(2.0))]);
+    // Fluence of a ball: its solid angle.
+    let exact = 10.0 * TAU * (1.0 - (1.0f32 - 1.0 / 16.0).sqrt());
+    let fluence = |discard: bool| {
+        let mut cache: ConeCache<BoundingEntry> = ConeCache::new(CacheParams::default()).unwrap();
+        let mut params = PaperParams::default();
+        params.bounding.discard = discard;
+        let tracer = Tracer::new(&rig.scene, &rig.pose);
+        let lights = AreaLights::new(&rig.scene, &rig.pose);
+        let moment = Moment { scene: &rig.scene, pose: &rig.pose, lights: &lights };
+        for _ in 0..60 {
+            let queue = rig.queue(&mut cache);
+            let places = EntryPlaces::of(&cache, &queue, &rig.scene, &rig.pose, &rig.pose);
+            let changes = Changes::between(&moment, &moment);
+            let counts = update_bounding_cones(&mut cache, &queue, &places, &tracer, &changes, &params);
+            assert!(counts.rays > counts.updated, "samples and probes");
+        }
+        let all: Vec<f32> = cache.ids().map(|id| cache.entry(id).unwrap().energy().x).collect();
+        all.iter().sum::<f32>() / all.len() as f32
+    };
+    assert_near(fluence(false), exact, 0.01);
+    assert_near(fluence(true), exact, 0.04);
+}
+
+#[test]
+fn a_still_scene_settles_and_then_takes_no_rays() {
+    let lamp = (sphere(Vec3::ZERO, 0.3, 12, 16), EmitterShape::Sphere, 10.0, over(2.0));
+    let rig = Rig::new(vec![lamp, (rectangle(1.0, 0.5), EmitterShape::Rectangle, 3.0, over(4.0))]);
+    let params = SlcParams::default();
+    let mut cache = rig.cache();
+    let mut steps = 0;
+    loop {
+        let counts = rig.step(&mut cache, &rig.pose, &rig.pose, &params);
+        assert_eq!(counts.changed, 0);
+        if counts.updated == 0 {
+            assert_eq!(counts.rays, 0);
+            break;
+        }
+        steps += 1;
+        assert!(steps <= 8 + 191, "8 updates of 8 samples, then one each up to 255");
+    }
+    let entries: Vec<MomentEntry> = cache.ids().map(|id| *cache.entry(id).unwrap()).collect();
+    rig.step(&mut cache, &rig.pose, &rig.pose, &params);
+    let after: Vec<MomentEntry> = cache.ids().map(|id| *cache.entry(id).unwrap()).collect();
+    assert_eq!(entries, after, "to the bit");
+}
+
+#[test]
+fn a_light_that_leaves_is_forgotten_at_once_and_one_that_comes_is_learnt() {
+    let lamp = |at: Vec3| {
+        (sphere(Vec3::ZERO, 0.3, 12, 16), EmitterShape::Sphere, 10.0, Affine3A::from_translation(at))
+    };
+    let rig = Rig::new(vec![lamp(Vec3::new(1.0, 2.0, 0.0)), lamp(Vec3::new(-1.0, 2.0, 0.0))]);
+    let params = SlcParams::default();
+    let mut cache = rig.settled(20, &params);
+    let both = mean(&cache);
+    let mut without = rig.pose.clone();
+    without.instances[2] = PosedInstance::REMOVED;
+    rig.step(&mut cache, &rig.pose, &without, &params);
+    assert_near(mean(&cache), 0.5 * both, 0.03);
+    for _ in 0..10 {
+        rig.step(&mut cache, &without, &without, &params);
+    }
+    assert_near(mean(&cache), 0.5 * both, 0.01);
+    assert!(cache.ids().all(|id| !cache.entry(id).unwrap().may_hold(1)), "no cone remembers it");
+    rig.step(&mut cache, &without, &rig.pose, &params);
+    for _ in 0..30 {
+        rig.step(&mut cache, &rig.pose, &rig.pose, &params);
+    }
+    assert_near(mean(&cache), both, 0.02);
+}
+
+#[test]
+fn cones_follow_a_light_that_moves() {
+    let lamp = (sphere(Vec3::ZERO, 0.3, 12, 16), EmitterShape::Sphere, 10.0, over(2.0));
+    let rig = Rig::new(vec![lamp]);
+    let params = SlcParams::default();
+    let mut cache = rig.settled(20, &params);
+    let mut before = rig.pose.clone();
+    for step in 1..=30 {
+        let mut now = rig.pose.clone();
+        let at = Vec3::new(0.1 * step as f32, 2.0, 0.0);
+        now.instances[1].world_from_mesh = Affine3A::from_translation(at);
+        let counts = rig.step(&mut cache, &before, &now, &params);
+        assert_eq!(counts.changed, counts.updated);
+        let (d2, cos) = (at.length_squared(), 2.0 / at.length());
+        assert_near(mean(&cache), 10.0 * PI * 0.09 / d2 * cos, 0.03);
+        for id in cache.ids() {
+            let sum = cache.entry(id).unwrap().cones().iter().fold(Vec3::ZERO, |sum, cone| sum + cone.moment);
+            assert!(sum.normalize().dot(at.normalize()) > 0.99, "step {step}: {sum}");
+        }
+        before = now;
+    }
+}
+
+#[test]
+fn what_moves_in_front_of_a_light_is_noticed() {
+    let lamp = (sphere(Vec3::ZERO, 0.3, 12, 16), EmitterShape::Sphere, 10.0, over(2.0));
+    // A black shutter: it emits nothing, so it is no light.
+    let rig = Rig::new(vec![lamp, (rectangle(0.5, 0.5), EmitterShape::Triangles, 0.0, over(1.0))]);
+    let mut aside = rig.pose.clone();
+    aside.instances[2].world_from_mesh = Affine3A::from_translation(Vec3::new(6.0, 1.0, 0.0));
+    let params = SlcParams::default();
+    let mut cache = rig.cache();
+    for _ in 0..40 {
+        rig.step(&mut cache, &aside, &aside, &params);
+    }
+    let open = mean(&cache);
+    assert_near(open, 10.0 * PI * 0.09 / 4.0, 0.01);
+    let counts = rig.step(&mut cache, &aside, &rig.pose, &params);
+    assert!(counts.changed > 150, "{counts:?}");
+    for _ in 0..15 {
+        rig.step(&mut cache, &rig.pose, &rig.pose, &params);
+    }
+    assert!(mean(&cache) < 0.12 * open, "{} of {open} after 16 updates", mean(&cache));
+    // Aside and far from every line to the light, it changes nothing.
+    let mut farther = aside.clone();
+    farther.instances[2].world_from_mesh.translation.x += 1.0;
+    assert_eq!(rig.step(&mut cache, &aside, &farther, &params).changed, 0);
+}
+
+#[test]
+fn no_light_breaks_an_entry() {
+    let flat = |s: f32| Affine3A::from_translation(Vec3::Y) * Affine3A::from_scale(Vec3::splat(s));
+    for radiance in [0.0, 1e-30, 1e30] {
+        for scale in [0.0, 1e-20, 1.0, 1e12] {
+            let light = |shape| (sphere(Vec3::ZERO, 0.3, 6, 8), shape, radiance, flat(scale));
+            let rig = Rig::new(EmitterShape::NAMES.map(|(_, shape)| light(shape)).to_vec());
+            let cache = rig.settled(3, &SlcParams::default());
+            for id in cache.ids() {
+                let entry = cache.entry(id).unwrap();
+                assert!(entry.energy().is_finite(), "{radiance} {scale}");
+                let cones = entry.cones();
+                assert!(cones.iter().all(|c| c.direction().is_normalized() && c.cos_angle().is_finite()));
+            }
+        }
+    }
+}
+
+#[test]
+fn the_number_of_threads_does_not_matter() {
+    let lamp = (sphere(Vec3::ZERO, 0.3, 12, 16), EmitterShape::Sphere, 10.0, over(2.0));
+    let rig = Rig::new(vec![lamp, (rectangle(1.0, 0.5), EmitterShape::Rectangle, 3.0, over(4.0))]);
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let cache = rig.settled(12, &SlcParams::default());
+            cache.ids().map(|id| *cache.entry(id).unwrap()).collect::<Vec<_>>()
+        })
+    };
+    assert_eq!(run(1), run(5));
+}

@@ -6,6 +6,7 @@ mod compensation;
 mod guard_band;
 mod hidden_layers;
 mod layers;
+mod light;
 mod map_cost;
 mod map_rules;
 mod medians;
@@ -55,7 +56,7 @@ pub(super) trait Study: std::fmt::Debug {
 type Reader = fn(&mut toml::Table) -> Result<Box<dyn Study>>;
 
 /// Every kind by its name.
-const KINDS: [(&str, Reader); 13] = [
+const KINDS: [(&str, Reader); 15] = [
     ("z-precision", |table| own::<z_precision::ZPrecision>(table, &["distances", "triangles"])),
     ("mip-filters", |table| own::<mip_filters::MipFilters>(table, &[])),
     ("radius", |table| own::<radius::Radius>(table, &["radii", "line-bytes"])),
@@ -68,6 +69,10 @@ const KINDS: [(&str, Reader); 13] = [
     ("compensation", |table| own::<compensation::Compensation>(table, &["factors", "samples"])),
     ("hidden-layers", |table| own::<hidden_layers::HiddenLayers>(table, &["plates"])),
     ("multi-view", |table| own::<multi_view::MultiView>(table, &["repeats"])),
+    ("light-methods", |table| own::<light::table::LightMethods>(table, &["steps", "truth-samples"])),
+    ("light-viewers", |table| {
+        own::<light::viewers::LightViewers>(table, &["viewers", "steps", "truth-samples"])
+    }),
     ("pop-in", |table| own::<pop_in::PopIn>(table, &["steps"])),
 ];
 

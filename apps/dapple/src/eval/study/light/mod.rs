@@ -1,0 +1,184 @@
+//! Studies of direct light from area lights: light cones and their rivals ([Stadlbauer2023]).
+
+pub(super) mod table;
+pub(super) mod viewers;
+
+use std::time::Instant;
+
+use anyhow::{Result, bail};
+use dapple_metrics::{flip, psnr, ssim};
+use dapple_render::image::{LinearImage, Rgb8Image, ToneMap};
+use dapple_scene::area_lights::AreaLights;
+use dapple_scene::glam::Vec3;
+use dapple_scene::{Pose, PosedCamera};
+use dapple_server::cones::{Now, cone_charts};
+use dapple_store::cones::Charting;
+
+use super::Subject;
+use crate::direct_light::{Cost, Lighter, Seen, Technique};
+use crate::eval::stage::Stage;
+
+/// Steps of a server a second.
+const STEPS_HZ: f64 = 15.0;
+
+/// A scene whose lights have an area, along a path.
+struct Lit<'a> {
+    stage: &'a Stage<'a>,
+    charting: Charting,
+}
+
+impl<'a> Lit<'a> {
+    fn new(subject: &'a Subject<'_>) -> Result<Lit<'a>> {
+        let stage = subject.stage()?;
+        let pose = stage.scene().pose(0.0);
+        if AreaLights::new(stage.scene(), &pose).is_empty() {
+            bail!("{} has no area light: nothing in it emits", stage.scene().name);
+        }
+        let (charting, problems) = cone_charts(stage.scene());
+        for problem in problems {
+            tracing::warn!("{problem}; it carries no cones");
+        }
+        Ok(Lit { stage, charting })
+    }
+
+    fn size(&self) -> [u32; 2] {
+        super::size_of(self.stage)
+    }
+
+    /// Calls with the scene at one time.
+    fn at<T>(&self, pose: &Pose, call: impl FnOnce(&Now<'_>, &AreaLights<'_>) -> Result<T>) -> Result<T> {
+        let tracer = self.stage.tracer_in(pose);
+        let now = Now { scene: self.stage.scene(), pose, tracer: &tracer, environment: None };
+        call(&now, &AreaLights::new(self.stage.scene(), pose))
+    }
+}
+
+/// A technique being watched.
+struct Run {
+    name: String,
+    lighter: Lighter,
+    /// Milliseconds of each watched step, by stage.
+    stages: Vec<(&'static str, Vec<f64>)>,
+    totals: Vec<f64>,
+    cost: Cost,
+}
+
+impl Run {
+    fn new(name: impl Into<String>, technique: Technique) -> Result<Run> {
+        let lighter = Lighter::new(technique)?;
+        Ok(Run { name: name.into(), lighter, stages: Vec::new(), totals: Vec::new(), cost: Cost::default() })
+    }
+
+    /// One step, timed if it is `watched`.
+    fn step(
+        &mut self,
+        now: &Now<'_>,
+        lights: &AreaLights<'_>,
+        seen: &[Seen],
+        charting: &Charting,
+        watched: bool,
+    ) -> Vec<Vec<Vec3>> {
+        let (mut last, mut total) = (Instant::now(), 0.0);
+        let stages = &mut self.stages;
+        let (pictures, cost) = self.lighter.light(now, lights, seen, charting, &mut |stage| {
+            let ms = 1e3 * last.elapsed().as_secs_f64();
+            total += ms;
+            if watched {
+                match stages.iter_mut().find(|(name, _)| *name == stage) {
+                    Some((_, all)) => all.push(ms),
+                    None => stages.push((stage, vec![ms])),
+                }
+            }
+            last = Instant::now();
+        });
+        if watched {
+            self.totals.push(total);
+        }
+        self.cost = cost;
+        pictures
+    }
+
+    fn ms(&self) -> f64 {
+        middle(&self.totals)
+    }
+
+    fn stage_ms(&self, names: &[&str]) -> f64 {
+        self.stages.iter().filter(|(name, _)| names.contains(name)).map(|(_, ms)| middle(ms)).sum()
+    }
+}
+
+fn middle(values: &[f64]) -> f64 {
+    let mut values = values.to_vec();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// A picture against the truth.
+#[derive(Debug, Clone, Copy, Default)]
+struct Quality {
+    /// Mean squared error of what a display shows.
+    mse: f64,
+    ssim: f64,
+    flip: f64,
+    /// Of the mean luminance, parts.
+    bias: f64,
+    count: f64,
+}
+
+impl Quality {
+    fn add(&mut self, size: [u32; 2], truth: &[Vec3], found: &[Vec3]) -> Result<()> {
+        let [width, height] = size;
+        let [a, b] = [truth, found].map(|pixels| shown(size, pixels));
+        let unit =
+            |p: &Rgb8Image| p.pixels.as_flattened().iter().map(|c| f32::from(*c) / 255.0).collect::<Vec<_>>();
+        let luma = |p: &Rgb8Image| {
+            p.pixels
+                .iter()
+                .map(|[r, g, b]| {
+                    (0.2126 * f32::from(*r) + 0.7152 * f32::from(*g) + 0.0722 * f32::from(*b)) / 255.0
+                })
+                .collect::<Vec<_>>()
+        };
+        let db = psnr(&unit(&a), &unit(&b), 1.0)?;
+        self.mse += 10f64.powf(-0.1 * db);
+        self.ssim += ssim(width, height, &luma(&a), &luma(&b))?;
+        self.flip +=
+            flip(width, height, a.pixels.as_flattened(), b.pixels.as_flattened(), PIXELS_PER_DEGREE)?.mean;
+        // Of what a display can show: a lamp's own brightness would hide all else.
+        let mean = |pixels: &[Vec3]| {
+            pixels.iter().map(|p| f64::from(p.min(Vec3::splat(4.0)).element_sum())).sum::<f64>()
+        };
+        self.bias += mean(found) / mean(truth).max(1e-12) - 1.0;
+        self.count += 1.0;
+        Ok(())
+    }
+
+    fn psnr_db(&self) -> f64 {
+        super::psnr_db(self.mse / self.count)
+    }
+
+    fn mean_ssim(&self) -> f64 {
+        self.ssim / self.count
+    }
+
+    fn mean_flip(&self) -> f64 {
+        self.flip / self.count
+    }
+
+    fn bias_percent(&self) -> f64 {
+        100.0 * self.bias / self.count
+    }
+}
+
+/// For FLIP: a monitor 0.7 m wide of 3840 pixels, seen from 0.7 m.
+const PIXELS_PER_DEGREE: f32 = 67.0;
+
+/// What a display shows.
+fn shown([width, height]: [u32; 2], pixels: &[Vec3]) -> Rgb8Image {
+    LinearImage { width, height, pixels: pixels.to_vec() }.to_rgb8(&ToneMap::default())
+}
+
+/// A camera of the path.
+fn camera(stage: &Stage<'_>, time_s: f64) -> PosedCamera {
+    stage.camera(time_s)
+}
