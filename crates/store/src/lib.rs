@@ -5,5 +5,6 @@
 
 pub mod cells;
 pub mod charts;
+pub mod cones;
 mod octahedral;
 pub mod points;

@@ -1,0 +1,264 @@
+//! The on-surface cache ([Stadlbauer2023] sec. 2.1): entries in blocks of 8×8 texels of the charts, for all viewers together.
+//!
+//! A frame is: [`Requests::gather`] what the viewers see, [`ConeCache::admit`] it, which gives an [`UpdateQueue`], trace what
+//! of it one can afford, [`ConeCache::update`] the entries, and read them with a [`Reader`]. Nothing here depends on the
+//! number of threads or on the layout of the hash map.
+
+mod admit;
+mod read;
+mod requests;
+#[cfg(test)]
+mod tests;
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+
+use super::entry::{ConeEntry, ConeError, check_rules};
+use super::key::{BLOCK_TEXELS, BlockKey, KeyHash, TexelKey};
+use requests::bits;
+
+pub use admit::{QueuedTexel, UpdateQueue};
+pub use read::{Reader, Reads};
+pub use requests::{LookUp, PixelPlace, Requests, TexelPlace, View};
+
+/// Most blocks of a cache: their texels are numbered in 32 bits.
+const MOST_BLOCKS: u64 = 1 << 26;
+
+/// What a block costs in the hash map, bytes: key, index, control byte, at the load that it doubles at.
+const MAP_BYTES: u64 = 64;
+
+/// How a cache is kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CacheParams {
+    /// Memory it may take, bytes; at least one block's. Default 512 MiB.
+    pub most_bytes: u64,
+    /// How many levels away a new entry looks for one to begin with, 0 … 4. Default 2.
+    pub reuse_levels: u8,
+    /// Most samples that what it begins with counts for, 1 … 4095. Default 16.
+    pub reuse_samples: u16,
+}
+
+impl Default for CacheParams {
+    fn default() -> Self {
+        CacheParams { most_bytes: 512 << 20, reuse_levels: 2, reuse_samples: 16 }
+    }
+}
+
+impl CacheParams {
+    /// Whether the parameters are in range.
+    ///
+    /// # Errors
+    ///
+    /// The first that is not.
+    pub fn check(&self) -> Result<(), ConeError> {
+        let (levels, samples) = (self.reuse_levels, self.reuse_samples);
+        check_rules([
+            ("reuse_levels", f64::from(levels), levels <= 4, "it must be 0 to 4"),
+            ("reuse_samples", f64::from(samples), (1..=4095).contains(&samples), "it must be 1 to 4095"),
+        ])
+    }
+}
+
+/// Names an entry until the next [`ConeCache::admit`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct EntryId(u32);
+
+impl EntryId {
+    fn new(slot: usize, texel: usize) -> EntryId {
+        EntryId((slot * BLOCK_TEXELS + texel) as u32)
+    }
+
+    fn slot(self) -> usize {
+        self.0 as usize / BLOCK_TEXELS
+    }
+
+    fn texel(self) -> usize {
+        self.0 as usize % BLOCK_TEXELS
+    }
+}
+
+/// What is looked at often of a block.
+#[derive(Clone, Copy, Debug)]
+struct Head {
+    key: BlockKey,
+    /// Texels that have a place.
+    known: u64,
+    /// Texels wanted in this frame.
+    wanted: u64,
+    /// Texels whose place became another in this frame.
+    moved: u64,
+    last_wanted: u32,
+    /// Where its texels are in this frame's queue.
+    first_queued: u32,
+    /// Whether a key leads here; the others wait to be used again.
+    is_used: bool,
+}
+
+/// A block's texels.
+#[derive(Clone, Debug)]
+struct Body<E> {
+    places: [TexelPlace; BLOCK_TEXELS],
+    /// Frame of the last update.
+    updated: [u32; BLOCK_TEXELS],
+    entries: [E; BLOCK_TEXELS],
+}
+
+impl<E: ConeEntry> Body<E> {
+    fn empty() -> Box<Body<E>> {
+        Box::new(Body {
+            places: [TexelPlace::default(); BLOCK_TEXELS],
+            updated: [0; BLOCK_TEXELS],
+            entries: std::array::from_fn(|_| E::default()),
+        })
+    }
+}
+
+/// What the cache holds and did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CacheCounts {
+    /// Blocks in use.
+    pub blocks: u64,
+    /// Texels that have a place.
+    pub entries: u64,
+    /// Memory, bytes, with blocks that wait to be used again.
+    pub bytes: u64,
+}
+
+/// Entries of all instances.
+#[derive(Clone, Debug)]
+pub struct ConeCache<E> {
+    params: CacheParams,
+    /// Never walked through: the order is that of `heads`.
+    slot_of: HashMap<BlockKey, u32, KeyHash>,
+    heads: Vec<Head>,
+    bodies: Vec<Box<Body<E>>>,
+    /// Slots that wait to be used again.
+    free: Vec<u32>,
+    frame: u32,
+}
+
+impl<E: ConeEntry> ConeCache<E> {
+    /// An empty cache.
+    ///
+    /// # Errors
+    ///
+    /// A parameter out of range.
+    pub fn new(params: CacheParams) -> Result<ConeCache<E>, ConeError> {
+        params.check()?;
+        Ok(ConeCache {
+            params,
+            slot_of: HashMap::default(),
+            heads: Vec::new(),
+            bodies: Vec::new(),
+            free: Vec::new(),
+            frame: 0,
+        })
+    }
+
+    /// Memory of one block, bytes.
+    pub fn block_bytes() -> u64 {
+        (size_of::<Head>() + size_of::<Body<E>>()) as u64 + MAP_BYTES
+    }
+
+    /// Most blocks that its memory allows.
+    pub fn most_blocks(&self) -> u64 {
+        (self.params.most_bytes / Self::block_bytes()).clamp(1, MOST_BLOCKS)
+    }
+
+    /// What it holds now.
+    pub fn counts(&self) -> CacheCounts {
+        let used = self.heads.iter().filter(|head| head.is_used);
+        let (blocks, entries) =
+            used.fold((0, 0), |(b, e), head| (b + 1, e + u64::from(head.known.count_ones())));
+        CacheCounts { blocks, entries, bytes: self.heads.len() as u64 * Self::block_bytes() }
+    }
+
+    /// Number of the frame: how often something was admitted.
+    pub fn frame(&self) -> u32 {
+        self.frame
+    }
+
+    /// Updates entries of this frame's queue in parallel, in the caller's thread pool: `update` gets the index in the queue, what
+    /// stands there, and the entry, and says whether it did anything. Returns how many entries it did.
+    ///
+    /// # Errors
+    ///
+    /// The queue is of another frame.
+    pub fn update<F>(&mut self, queue: &UpdateQueue, update: F) -> Result<u64, ConeError>
+    where
+        F: Fn(usize, &QueuedTexel, &mut E) -> bool + Sync,
+    {
+        if queue.frame != self.frame {
+            let (name, rule) = ("frame of the queue", "it must be the cache's last one");
+            return Err(ConeError::BadParameter { name, value: f64::from(queue.frame), rule });
+        }
+        let frame = self.frame;
+        let done = self.heads.par_iter().zip(&mut self.bodies).map(|(head, body)| {
+            let mut done = 0;
+            for (index, texel) in (head.first_queued as usize..).zip(bits(head.wanted)) {
+                let Some(queued) = queue.texels.get(index) else { break };
+                if update(index, queued, &mut body.entries[texel]) {
+                    body.updated[texel] = frame;
+                    done += 1;
+                }
+            }
+            done
+        });
+        Ok(done.sum())
+    }
+
+    /// An entry, if it has a place.
+    pub fn entry(&self, id: EntryId) -> Option<&E> {
+        let head = self.heads.get(id.slot())?;
+        (head.known >> id.texel() & 1 == 1).then(|| &self.bodies[id.slot()].entries[id.texel()])
+    }
+
+    /// An entry, to be changed, if it has a place.
+    pub fn entry_mut(&mut self, id: EntryId) -> Option<&mut E> {
+        let head = self.heads.get(id.slot())?;
+        (head.known >> id.texel() & 1 == 1).then(|| &mut self.bodies[id.slot()].entries[id.texel()])
+    }
+
+    /// Instance and place of an entry.
+    pub fn place(&self, id: EntryId) -> Option<(u32, TexelPlace)> {
+        let head = self.heads.get(id.slot())?;
+        let body = self.bodies.get(id.slot())?;
+        (head.known >> id.texel() & 1 == 1).then(|| (head.key.instance, body.places[id.texel()]))
+    }
+
+    /// The texel of an entry.
+    pub fn key(&self, id: EntryId) -> Option<TexelKey> {
+        let head = self.heads.get(id.slot()).filter(|head| head.is_used)?;
+        Some(TexelKey { block: head.key, texel: id.texel() as u8 })
+    }
+
+    /// The entry of a texel, if it has a place.
+    pub fn find(&self, key: &TexelKey) -> Option<EntryId> {
+        let slot = *self.slot_of.get(&key.block)? as usize;
+        (self.heads[slot].known >> key.texel & 1 == 1).then(|| EntryId::new(slot, usize::from(key.texel)))
+    }
+
+    /// All entries that have a place, in an order that depends on what was admitted alone.
+    pub fn ids(&self) -> impl Iterator<Item = EntryId> + '_ {
+        let used = self.heads.iter().enumerate().filter(|(_, head)| head.is_used);
+        used.flat_map(|(slot, head)| bits(head.known).map(move |texel| EntryId::new(slot, texel)))
+    }
+
+    /// Removes the blocks of instances that are not to be kept. This ends the frame's queue.
+    pub fn retain_instances(&mut self, keep: impl Fn(u32) -> bool) {
+        for slot in 0..self.heads.len() {
+            if self.heads[slot].is_used && !keep(self.heads[slot].key.instance) {
+                self.release(slot);
+            }
+        }
+    }
+
+    /// Forgets a block. Its memory waits to be used again.
+    fn release(&mut self, slot: usize) {
+        let head = &mut self.heads[slot];
+        self.slot_of.remove(&head.key);
+        (head.is_used, head.known, head.wanted, head.moved) = (false, 0, 0, 0);
+        self.free.push(slot as u32);
+    }
+}

@@ -1,0 +1,310 @@
+//! Stage 1: which texels all viewers together want, and the place each stands for ([Stadlbauer2023] sec. 2.1, *visibility*).
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+
+use super::super::charting::ChartPlace;
+use super::super::entry::{ConeError, check_rules};
+use super::super::key::{BLOCK_TEXELS, BlockKey, KeyHash, SLABS, TexelKey, edge_of, level_of};
+
+/// Side of a tile of pixels.
+const TILE: usize = 64;
+
+/// Added to the distance of a place that lies in another texel, so that any place of its own is nearer.
+const OUTSIDE: f32 = 8.0;
+
+/// What a viewer sees in a pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelPlace {
+    /// Index of the instance.
+    pub instance: u32,
+    /// Index of the triangle.
+    pub triangle: u32,
+    /// Weights of its second and third corner.
+    pub barycentrics: [f32; 2],
+    /// Where that lies in its chart.
+    pub place: ChartPlace,
+    /// Edge of the pixel on the surface, metres.
+    pub footprint_m: f32,
+}
+
+/// What one viewer sees.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// Pixels of a row, ≥ 1. For places that are no picture, their number.
+    pub width: usize,
+    /// Rows of pixels; `None` where there is nothing to light.
+    pub pixels: &'a [Option<PixelPlace>],
+}
+
+/// Which texels a pixel needs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LookUp {
+    /// Texels are this many pixel footprints wide, 1/64 … 64. Default 1 (the *cache bias* of [Stadlbauer2023] sec. 4).
+    pub bias: f32,
+    /// Whether a pixel needs the 2×2 texels about it, to blend; otherwise only its own. Default true.
+    pub blend: bool,
+}
+
+impl Default for LookUp {
+    fn default() -> Self {
+        LookUp { bias: 1.0, blend: true }
+    }
+}
+
+impl LookUp {
+    /// Whether the parameters are in range.
+    ///
+    /// # Errors
+    ///
+    /// The first that is not.
+    pub fn check(&self) -> Result<(), ConeError> {
+        let holds = (1.0 / 64.0..=64.0).contains(&self.bias);
+        check_rules([("bias", f64::from(self.bias), holds, "it must be 1/64 to 64")])
+    }
+}
+
+/// The place on the surface that a texel stands for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TexelPlace {
+    /// Index of the triangle.
+    pub triangle: u32,
+    /// Weights of its second and third corner.
+    pub barycentrics: [f32; 2],
+    /// Rank among those that ask: squared distance to the texel's centre, in texels, and more outside the texel.
+    rank: f32,
+}
+
+impl TexelPlace {
+    /// Whether it lies in its texel; otherwise in one beside it, because only a neighbour asked.
+    pub fn is_inside(&self) -> bool {
+        self.rank < OUTSIDE
+    }
+
+    /// Nearest to the centre first, then lowest triangle, then the barycentrics' bits: no order of pixels changes who wins.
+    fn order(&self) -> (u32, u32, u32, u32) {
+        let [v, w] = self.barycentrics;
+        (self.rank.to_bits(), self.triangle, v.to_bits(), w.to_bits())
+    }
+
+    /// Takes the other place if that goes before this.
+    pub(super) fn improve(&mut self, other: &TexelPlace) {
+        if other.order() < self.order() {
+            *self = *other;
+        }
+    }
+}
+
+/// Texels of one block that one tile of pixels wants.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BlockRequest {
+    pub(super) key: BlockKey,
+    /// A bit a texel.
+    pub(super) wanted: u64,
+    /// The first texel's place in [`TileRequests::places`]; the others follow in their order.
+    pub(super) first: u32,
+}
+
+/// What one tile of pixels wants, each texel once.
+#[derive(Clone, Debug, Default)]
+pub(super) struct TileRequests {
+    pub(super) blocks: Vec<BlockRequest>,
+    pub(super) places: Vec<TexelPlace>,
+}
+
+/// What all viewers want. The same for any number of threads.
+#[derive(Clone, Debug, Default)]
+pub struct Requests {
+    pub(super) tiles: Vec<TileRequests>,
+}
+
+impl Requests {
+    /// Collects what the viewers' pixels need, tile by tile, in the caller's thread pool. Pixels whose place is no number are
+    /// left out.
+    pub fn gather(views: &[View<'_>], look_up: &LookUp) -> Requests {
+        let tiles: Vec<(usize, usize, usize)> = views
+            .iter()
+            .enumerate()
+            .flat_map(|(i, view)| {
+                let (width, rows) = (view.width.max(1), view.pixels.len().div_ceil(view.width.max(1)));
+                let across = width.div_ceil(TILE);
+                (0..across * rows.div_ceil(TILE)).map(move |t| (i, t % across * TILE, t / across * TILE))
+            })
+            .collect();
+        let tiles = tiles
+            .into_par_iter()
+            .map_init(Scratch::default, |scratch, (view, x, y)| scratch.gather(&views[view], x, y, look_up))
+            .collect();
+        Requests { tiles }
+    }
+
+    /// Texels wanted, counted once in each tile of 64×64 pixels.
+    pub fn texel_count(&self) -> usize {
+        self.tiles.iter().map(|tile| tile.places.len()).sum()
+    }
+}
+
+/// The texels about a place.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Nearby {
+    /// Chart and level; x and y are not those of a texel.
+    block: BlockKey,
+    /// In texels of the level.
+    at: [f32; 2],
+    /// First and last texel along x and y that a place of the chart lies in.
+    low: [i32; 2],
+    high: [i32; 2],
+}
+
+impl Nearby {
+    /// `None` if there is no level for it.
+    pub(super) fn of(pixel: &PixelPlace, bias: f32) -> Option<Nearby> {
+        let ChartPlace { chart, uv, depth, size, texel_m } = pixel.place;
+        let level = level_of(pixel.footprint_m, texel_m, bias)?;
+        let shrink = edge_of(-level);
+        let at = uv.map(|v| v * shrink);
+        if !(at[0].is_finite() && at[1].is_finite()) {
+            return None;
+        }
+        let is_slab = chart & SLABS != 0;
+        // Places of a chart lie half a texel within its rectangle.
+        let (low, high) = if is_slab {
+            ([i32::MIN; 2], [i32::MAX; 2])
+        } else {
+            let last = size.map(|s| ((f32::from(s) - 0.5).max(0.5) * shrink).floor() as i32);
+            ([(0.5 * shrink).floor() as i32; 2], last)
+        };
+        let slab = if is_slab { (depth * shrink).floor() as i32 } else { 0 };
+        let block = BlockKey { instance: pixel.instance, chart, level, slab, x: 0, y: 0 };
+        Some(Nearby { block, at, low, high })
+    }
+
+    /// The texel that the place lies in.
+    pub(super) fn own(&self) -> TexelKey {
+        let [x, y] = self.at.map(|v| v.floor() as i32);
+        self.block.texel_at(x, y)
+    }
+
+    /// Calls for each texel of the 2×2 whose centres are about the place, with its weight and its coordinates.
+    pub(super) fn each_of_four(&self, mut visit: impl FnMut(TexelKey, f32, [i32; 2])) {
+        let [u, v] = self.at.map(|v| v - 0.5);
+        let [x0, y0] = [u.floor(), v.floor()];
+        let (right, down) = (u - x0, v - y0);
+        let (x0, y0) = (x0 as i32, y0 as i32);
+        for (dy, weight_y) in [(0, 1.0 - down), (1, down)] {
+            for (dx, weight_x) in [(0, 1.0 - right), (1, right)] {
+                let at = [x0.saturating_add(dx), y0.saturating_add(dy)];
+                let exists = (0..2).all(|k| (self.low[k]..=self.high[k]).contains(&at[k]));
+                if exists && weight_x * weight_y > 0.0 {
+                    visit(self.block.texel_at(at[0], at[1]), weight_x * weight_y, at);
+                }
+            }
+        }
+    }
+
+    /// Rank of the place as that of a texel.
+    fn rank(&self, texel: [i32; 2]) -> f32 {
+        let from_centre = |k: usize| self.at[k] - (texel[k] as f32 + 0.5);
+        let (x, y) = (from_centre(0), from_centre(1));
+        let inside = self.at[0].floor() as i32 == texel[0] && self.at[1].floor() as i32 == texel[1];
+        // Less than 1.5 texels away in either direction, so less than 8 squared.
+        x * x + y * y + if inside { 0.0 } else { OUTSIDE }
+    }
+}
+
+/// What a tile wants so far.
+#[derive(Default)]
+struct Scratch {
+    /// Never walked through: the order is that of `blocks`.
+    block_of: HashMap<BlockKey, u32, KeyHash>,
+    blocks: Vec<Block>,
+    places: Vec<TexelPlace>,
+}
+
+struct Block {
+    key: BlockKey,
+    wanted: u64,
+    /// Indices into the tile's places, for the texels that are wanted.
+    places: [u16; BLOCK_TEXELS],
+}
+
+// A tile's places are numbered in 16 bits.
+const _: () = assert!(TILE * TILE * 5 <= 1 << 16);
+
+impl Scratch {
+    fn gather(&mut self, view: &View<'_>, left: usize, top: usize, look_up: &LookUp) -> TileRequests {
+        self.block_of.clear();
+        self.blocks.clear();
+        self.places.clear();
+        let width = view.width.max(1);
+        for y in top..top + TILE {
+            let row = (y * width).min(view.pixels.len())..((y + 1) * width).min(view.pixels.len());
+            let row = &view.pixels[row];
+            let row = &row[left.min(row.len())..(left + TILE).min(row.len())];
+            // The block that was asked last is likely to be asked again.
+            let mut last = 0;
+            for pixel in row.iter().flatten() {
+                self.want(pixel, look_up, &mut last);
+            }
+        }
+        self.flatten()
+    }
+
+    fn want(&mut self, pixel: &PixelPlace, look_up: &LookUp, last: &mut usize) {
+        let Some(nearby) = Nearby::of(pixel, look_up.bias) else { return };
+        let place = |rank| TexelPlace { triangle: pixel.triangle, barycentrics: pixel.barycentrics, rank };
+        let own = nearby.own();
+        self.add(&own, &place(nearby.rank(own.xy())), last);
+        if look_up.blend {
+            nearby.each_of_four(|key, _, at| {
+                if key != own {
+                    self.add(&key, &place(nearby.rank(at)), last);
+                }
+            });
+        }
+    }
+
+    fn add(&mut self, key: &TexelKey, place: &TexelPlace, last: &mut usize) {
+        if self.blocks.get(*last).is_none_or(|block| block.key != key.block) {
+            let next = self.blocks.len() as u32;
+            *last = *self.block_of.entry(key.block).or_insert(next) as usize;
+            if *last == self.blocks.len() {
+                self.blocks.push(Block { key: key.block, wanted: 0, places: [0; BLOCK_TEXELS] });
+            }
+        }
+        let block = &mut self.blocks[*last];
+        let (texel, bit) = (usize::from(key.texel), 1u64 << key.texel);
+        if block.wanted & bit == 0 {
+            block.wanted |= bit;
+            block.places[texel] = self.places.len() as u16;
+            self.places.push(*place);
+        } else {
+            self.places[usize::from(block.places[texel])].improve(place);
+        }
+    }
+
+    /// The places in the order of blocks and texels.
+    fn flatten(&self) -> TileRequests {
+        let mut places = Vec::with_capacity(self.places.len());
+        let blocks = self
+            .blocks
+            .iter()
+            .map(|block| {
+                let first = places.len() as u32;
+                places.extend(bits(block.wanted).map(|t| self.places[usize::from(block.places[t])]));
+                BlockRequest { key: block.key, wanted: block.wanted, first }
+            })
+            .collect();
+        TileRequests { blocks, places }
+    }
+}
+
+/// The numbers of the bits that are set, ascending.
+pub(super) fn bits(mut mask: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let next = (mask != 0).then(|| mask.trailing_zeros() as usize)?;
+        mask &= mask - 1;
+        Some(next)
+    })
+}

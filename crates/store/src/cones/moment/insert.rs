@@ -1,0 +1,133 @@
+//! Which cone a sample goes to: cases A to D of [Stadlbauer2023] sec. 3.1.1, over moments.
+
+use glam::Vec3;
+
+use super::super::entry::{GONE, angle_between, luminance};
+use super::{MOST_MOMENT_CONES, MomentCone, MomentEntry, MomentParams};
+
+/// Cones are not taken to be narrower than this, radians, when it is asked what lies inside: samples of a light
+/// that is almost a point then share a cone.
+const LEAST_ANGLE: f32 = 1e-3;
+
+impl MomentEntry {
+    /// Adds a sample, given as a cone of its own.
+    pub(super) fn insert(&mut self, sample: &MomentCone, direction: Vec3, light: u32, params: &MomentParams) {
+        let most = usize::from(params.cones).clamp(1, MOST_MOMENT_CONES);
+        // Case A: inside a cone (of its light): its energy grows. The nearest of several.
+        let mut inside: Option<(f32, usize)> = None;
+        for (i, cone) in self.cones().iter().enumerate() {
+            if params.tagged && !cone.lights.may_hold(light) {
+                continue;
+            }
+            let angle = angle_between(cone.direction(), direction);
+            if angle <= params.inside * cone.angle().max(LEAST_ANGLE) && inside.is_none_or(|(a, _)| angle < a)
+            {
+                inside = Some((angle, i));
+            }
+        }
+        if let Some((_, i)) = inside {
+            self.cones[i].absorb(sample);
+            return;
+        }
+        // Case B: there is room for another cone.
+        if usize::from(self.count) < most {
+            self.push(sample);
+            return;
+        }
+        while usize::from(self.count) > most {
+            self.merge_closest(params);
+        }
+        let nearest = self
+            .cones()
+            .iter()
+            .enumerate()
+            .map(|(i, cone)| (distance(cone, sample, params), i))
+            .fold((f32::INFINITY, 0), |best, next| if next.0 < best.0 { next } else { best });
+        match self.closest_pair(params) {
+            // Case D: two cones are closer to each other than the sample to any.
+            Some((apart, _, _)) if apart <= nearest.0 => {
+                self.merge_closest(params);
+                self.push(sample);
+            }
+            // Case C: the nearest cone takes it.
+            _ => self.cones[nearest.1].absorb(sample),
+        }
+    }
+
+    /// Frees the places of cones that hardly count. Their energy is not lost: it goes to the nearest cone, which keeps its shape
+    /// and its lights.
+    pub(super) fn settle(&mut self, params: &MomentParams) {
+        self.drop_dark();
+        let least = luminance(self.energy()) * params.least_share.clamp(0.0, 0.1);
+        let mut i = usize::from(self.count);
+        while i > 0 && self.count > 1 {
+            i -= 1;
+            let cone = self.cones[i];
+            if luminance(cone.energy) >= least {
+                continue;
+            }
+            self.remove(i);
+            let direction = cone.direction();
+            let heir = self
+                .cones()
+                .iter()
+                .enumerate()
+                .map(|(k, other)| (angle_between(other.direction(), direction), k))
+                .fold((f32::INFINITY, 0), |best, next| if next.0 < best.0 { next } else { best });
+            let heir = &mut self.cones[heir.1];
+            let before = luminance(heir.energy);
+            heir.energy += cone.energy;
+            heir.moment *= luminance(heir.energy) / before;
+        }
+    }
+
+    /// Leaves out cones that decayed to nothing.
+    pub(super) fn drop_dark(&mut self) {
+        for i in (0..usize::from(self.count)).rev() {
+            if luminance(self.cones[i].energy) < GONE {
+                self.remove(i);
+            }
+        }
+    }
+
+    fn push(&mut self, cone: &MomentCone) {
+        self.cones[usize::from(self.count)] = *cone;
+        self.count += 1;
+    }
+
+    /// Takes a cone out; the others keep their order.
+    fn remove(&mut self, at: usize) {
+        let count = usize::from(self.count);
+        self.cones.copy_within(at + 1..count, at);
+        self.cones[count - 1] = MomentCone::default();
+        self.count -= 1;
+    }
+
+    /// The two cones that are closest, and how far they are apart.
+    fn closest_pair(&self, params: &MomentParams) -> Option<(f32, usize, usize)> {
+        let mut best: Option<(f32, usize, usize)> = None;
+        for (i, a) in self.cones().iter().enumerate() {
+            for (k, b) in self.cones().iter().enumerate().skip(i + 1) {
+                let apart = distance(a, b, params);
+                if best.is_none_or(|(d, _, _)| apart < d) {
+                    best = Some((apart, i, k));
+                }
+            }
+        }
+        best
+    }
+
+    fn merge_closest(&mut self, params: &MomentParams) {
+        if let Some((_, i, k)) = self.closest_pair(params) {
+            let other = self.cones[k];
+            self.cones[i].absorb(&other);
+            self.remove(k);
+        }
+    }
+}
+
+/// Angle between axes, radians, and more for cones without a common light.
+fn distance(a: &MomentCone, b: &MomentCone, params: &MomentParams) -> f32 {
+    let apart = params.tagged && !a.lights.meets(b.lights);
+    angle_between(a.direction(), b.direction()) + if apart { params.apart_rad } else { 0.0 }
+}

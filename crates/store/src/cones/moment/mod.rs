@@ -1,0 +1,277 @@
+//! Moment cones: each cone is an energy and the mean of its directions, so that merging is a sum and shrinking is decay.
+//!
+//! Takes samples of light at one place; keeps up to four cones whose energies add up to the mean of all samples, whatever
+//! the cones are.
+
+mod insert;
+#[cfg(test)]
+mod tests;
+
+use glam::Vec3;
+
+use super::entry::{
+    ConeEntry, ConeError, ConeSample, GONE, LEAST_ENERGY, MOST_ENERGY, check_rules, luminance, unit,
+};
+use super::lights::LightSet;
+
+/// Most cones of a [`MomentEntry`].
+pub const MOST_MOMENT_CONES: usize = 4;
+
+/// How moment cones are kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MomentParams {
+    /// Cones of an entry, 1 … 4. Default 3 ([Stadlbauer2023] sec. 4).
+    pub cones: u8,
+    /// A sample is inside a cone up to this many times its opening angle from the axis, 0.5 … 4. Default 1.6.
+    pub inside: f32,
+    /// Most samples that an entry stands for, C_max, 1 … 4095. Default 255.
+    pub max_samples: u16,
+    /// A cone with less than this share of its entry's energy gives up its place, 0 … 0.1. Default 0.001.
+    pub least_share: f32,
+    /// Whether cones of different lights stay apart where there is room. Default true.
+    pub tagged: bool,
+    /// With `tagged`, cones without a common light count as this much further from each other, radians, 0 … π. Default 0.5.
+    pub apart_rad: f32,
+}
+
+impl Default for MomentParams {
+    fn default() -> Self {
+        MomentParams {
+            cones: 3,
+            inside: 1.6,
+            max_samples: 255,
+            least_share: 0.001,
+            tagged: true,
+            apart_rad: 0.5,
+        }
+    }
+}
+
+impl MomentParams {
+    /// Whether all parameters are in range.
+    ///
+    /// # Errors
+    ///
+    /// The first that is not.
+    pub fn check(&self) -> Result<(), ConeError> {
+        let (inside, share, apart) =
+            (f64::from(self.inside), f64::from(self.least_share), f64::from(self.apart_rad));
+        check_rules([
+            ("cones", f64::from(self.cones), (1..=4).contains(&self.cones), "it must be 1 to 4"),
+            ("inside", inside, (0.5..=4.0).contains(&inside), "it must be 0.5 to 4"),
+            (
+                "max_samples",
+                f64::from(self.max_samples),
+                (1..=4095).contains(&self.max_samples),
+                "it must be 1 to 4095",
+            ),
+            ("least_share", share, (0.0..=0.1).contains(&self.least_share), "it must be 0 to 0.1"),
+            (
+                "apart_rad",
+                apart,
+                (0.0..=std::f32::consts::PI).contains(&self.apart_rad),
+                "it must be 0 to \u{3c0}",
+            ),
+        ])
+    }
+}
+
+/// One cone.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MomentCone {
+    /// Energy that arrives through the cone: irradiance, W/m² (or fluence, if the samples were).
+    pub energy: Vec3,
+    /// Mean of luminance × direction over all samples, W/m². Not longer than the energy's luminance, but for rounding.
+    pub moment: Vec3,
+    /// Where the energy came from.
+    pub lights: LightSet,
+}
+
+impl MomentCone {
+    /// Unit vector along the cone's axis: the mean direction of its light. +Z where opposite directions cancel.
+    pub fn direction(&self) -> Vec3 {
+        unit(self.moment).unwrap_or(Vec3::Z)
+    }
+
+    /// Cosine of the opening angle (axis to rim), −1 … 1: that of the cap which, evenly bright, has the same moment, for which
+    /// |m| / lum(E) = (1 + cos a) / 2.
+    pub fn cos_angle(&self) -> f32 {
+        let luminance = luminance(self.energy);
+        if luminance < GONE {
+            return 1.0;
+        }
+        (2.0 * self.moment.length() / luminance - 1.0).clamp(-1.0, 1.0)
+    }
+
+    /// Opening angle, axis to rim, radians, 0 … π.
+    pub fn angle(&self) -> f32 {
+        libm::acosf(self.cos_angle())
+    }
+
+    /// A cone with a given axis (unit vector), energy and cosine of the opening angle.
+    pub fn from_cap(direction: Vec3, cos_angle: f32, energy: Vec3, lights: LightSet) -> MomentCone {
+        let length = luminance(energy) * 0.5 * (1.0 + cos_angle.clamp(-1.0, 1.0));
+        MomentCone { energy, moment: direction * length, lights }
+    }
+
+    fn scale(&mut self, factor: f32) {
+        self.energy *= factor;
+        self.moment *= factor;
+    }
+
+    fn absorb(&mut self, other: &MomentCone) {
+        self.energy += other.energy;
+        self.moment += other.moment;
+        self.lights = self.lights.union(other.lights);
+    }
+}
+
+/// A light's new place as seen from an entry: see [`MomentEntry::re_aim`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReAim {
+    /// Index of the light.
+    pub light: u32,
+    /// Unit vector towards its centre before.
+    pub from: Vec3,
+    /// Unit vector towards its centre now.
+    pub to: Vec3,
+    /// Unoccluded energy now ÷ before, ≥ 0.
+    pub energy_ratio: f32,
+    /// Its apparent radius now ÷ before, ≥ 0.
+    pub size_ratio: f32,
+}
+
+/// What one place holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MomentEntry {
+    cones: [MomentCone; MOST_MOMENT_CONES],
+    count: u8,
+    samples: u16,
+    taken: u32,
+}
+
+impl MomentEntry {
+    /// An entry of given cones (the first four count; those without energy, or whose numbers are not finite, are left out) that
+    /// stands for `samples` samples and has taken `taken` in its life.
+    pub fn from_parts(cones: &[MomentCone], samples: u16, taken: u32) -> MomentEntry {
+        let mut entry = MomentEntry { samples, taken, ..MomentEntry::default() };
+        for cone in cones.iter().take(MOST_MOMENT_CONES) {
+            let valid =
+                cone.energy.is_finite() && cone.moment.is_finite() && cone.energy.min_element() >= 0.0;
+            if valid && luminance(cone.energy) >= LEAST_ENERGY {
+                entry.cones[usize::from(entry.count)] = *cone;
+                entry.count += 1;
+            }
+        }
+        entry
+    }
+
+    /// Its cones; none where it is dark.
+    pub fn cones(&self) -> &[MomentCone] {
+        &self.cones[..usize::from(self.count)]
+    }
+
+    /// Samples that it stands for: C.
+    pub fn samples(&self) -> u16 {
+        self.samples
+    }
+
+    /// Samples drawn in its life, modulo 2³²: the index of its next one in a low-discrepancy sequence. Cutting C leaves it.
+    pub fn taken(&self) -> u32 {
+        self.taken
+    }
+
+    /// Energy of all cones.
+    pub fn energy(&self) -> Vec3 {
+        self.cones().iter().fold(Vec3::ZERO, |sum, cone| sum + cone.energy)
+    }
+
+    /// Takes the samples of one update: `drawn` were drawn, of which those in `samples` reached a light; the others are zeros. With
+    /// N drawn, β = N / (C + N) and
+    ///
+    /// E ← (1 − β) E + β/N Σ x, m ← (1 − β) m + β/N Σ lum(x) w, C ← min(C + N, C_max)
+    ///
+    /// for every cone, over the samples that went to it. So the energies of all cones add up to the mean of all samples (with
+    /// C at its limit, a mean that forgets), to rounding, in whatever order they come.
+    ///
+    /// Parameters out of range act as the nearest that is not. `drawn` is at least the number of samples.
+    pub fn update(&mut self, samples: &[ConeSample], drawn: u32, params: &MomentParams) {
+        let drawn = drawn.max(u32::try_from(samples.len()).unwrap_or(u32::MAX));
+        if drawn == 0 {
+            return;
+        }
+        let weight = 1.0 / (f32::from(self.samples) + drawn as f32);
+        let kept = f32::from(self.samples) * weight;
+        for cone in &mut self.cones[..usize::from(self.count)] {
+            cone.scale(kept);
+        }
+        for sample in samples {
+            if let Some((value, direction)) = sample.usable() {
+                let value = value * weight;
+                let moment = direction * luminance(value);
+                let cone = MomentCone { energy: value, moment, lights: LightSet::one(sample.light) };
+                self.insert(&cone, direction, sample.light, params);
+            }
+        }
+        let most = u32::from(params.max_samples.max(1));
+        self.samples = (u32::from(self.samples).saturating_add(drawn)).min(most) as u16;
+        self.taken = self.taken.wrapping_add(drawn);
+        self.settle(params);
+    }
+
+    /// Brings C down to `most`, so that what comes next counts for more.
+    pub fn cut_confidence(&mut self, most: u16) {
+        self.samples = self.samples.min(most);
+    }
+
+    /// Whether a light may have a part in it.
+    pub fn may_hold(&self, light: u32) -> bool {
+        self.cones().iter().any(|cone| cone.lights.may_hold(light))
+    }
+
+    /// Follows a light that moved: cones of this light alone turn with it and take its new energy and size. What is hidden
+    /// of it is taken to stay the same share. Returns how many cones did; cones of several lights stay. Arguments that are
+    /// not finite, or negative ratios, change nothing.
+    pub fn re_aim(&mut self, aim: &ReAim) -> usize {
+        let (Some(from), Some(to)) = (unit(aim.from), unit(aim.to)) else { return 0 };
+        let valid = |ratio: f32| ratio.is_finite() && ratio >= 0.0;
+        if !valid(aim.energy_ratio) || !valid(aim.size_ratio) {
+            return 0;
+        }
+        let mut turned = 0;
+        for cone in &mut self.cones[..usize::from(self.count)] {
+            if cone.lights.single() != Some(aim.light) {
+                continue;
+            }
+            let direction = turn(cone.direction(), from, to);
+            let angle = (cone.angle() * aim.size_ratio).min(std::f32::consts::PI);
+            let energy = (cone.energy * aim.energy_ratio).min(Vec3::splat(MOST_ENERGY));
+            *cone = MomentCone::from_cap(direction, libm::cosf(angle), energy, cone.lights);
+            turned += 1;
+        }
+        self.drop_dark();
+        turned
+    }
+}
+
+impl ConeEntry for MomentEntry {
+    fn confidence(&self) -> u16 {
+        self.samples
+    }
+
+    fn cut_confidence(&mut self, most: u16) {
+        MomentEntry::cut_confidence(self, most);
+    }
+}
+
+/// Turns a unit vector as the shortest turn takes `from` to `to` (unit vectors).
+fn turn(v: Vec3, from: Vec3, to: Vec3) -> Vec3 {
+    let cosine = from.dot(to);
+    if cosine < -0.9999 {
+        // Any axis across will do: half a turn about it.
+        let axis = from.any_orthonormal_vector();
+        return axis * (2.0 * axis.dot(v)) - v;
+    }
+    let axis = from.cross(to);
+    (v * cosine + axis.cross(v) + axis * (axis.dot(v) / (1.0 + cosine))).normalize_or(to)
+}

@@ -1,0 +1,117 @@
+//! Our entry in 14 bytes a cone and four more.
+
+use std::f32::consts::PI;
+
+use glam::{Vec2, Vec3};
+
+use super::super::entry::ConeEntry;
+use super::super::lights::{LIGHT_SET_BITS, LightSet};
+use super::super::moment::{MomentCone, MomentEntry};
+use super::bits::{BitReader, BitWriter};
+use super::floats::{energy_from_bits, energy_to_bits};
+use crate::octahedral::{flatten, unflatten};
+
+/// Steps of a component of a direction on either side of 0.
+const DIRECTION_STEPS: f32 = 4095.0;
+/// Steps of the square root of the opening angle.
+const ANGLE_STEPS: f32 = 4095.0;
+
+const SAMPLES_BITS: u32 = 12;
+const COUNT_BITS: u32 = 3;
+/// The rest of the header.
+const TAKEN_BITS: u32 = 32 - SAMPLES_BITS - COUNT_BITS;
+
+/// An entry of up to `CONES` cones in 4 + 14 · `CONES` bytes. A cone is an octahedral direction in 2 × 13 bits (within 6e-4 rad),
+/// the square root of the opening angle a in 12 (a within √(π a) / 4095 and 1e-6, so narrow cones stay as they are),
+/// the energy as 3 × [`energy_to_bits`], the lights in 20. The moment follows from these. C is in 12 bits, samples taken
+/// are modulo 2¹⁷.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct PackedMoment<const CONES: usize> {
+    header: [u8; 4],
+    cones: [[u8; 14]; CONES],
+}
+
+impl<const CONES: usize> Default for PackedMoment<CONES> {
+    fn default() -> Self {
+        PackedMoment { header: [0; 4], cones: [[0; 14]; CONES] }
+    }
+}
+
+impl<const CONES: usize> PackedMoment<CONES> {
+    /// Packs an entry. `None` if it has more cones than there is room for.
+    pub fn pack(entry: &MomentEntry) -> Option<PackedMoment<CONES>> {
+        let count = entry.cones().len();
+        if count > CONES {
+            return None;
+        }
+        let samples = u32::from(entry.samples()).min((1 << SAMPLES_BITS) - 1);
+        let header = samples
+            | (count as u32) << SAMPLES_BITS
+            | (entry.taken() & ((1 << TAKEN_BITS) - 1)) << (SAMPLES_BITS + COUNT_BITS);
+        let mut packed = PackedMoment { header: header.to_le_bytes(), ..PackedMoment::default() };
+        for (to, cone) in packed.cones.iter_mut().zip(entry.cones()) {
+            *to = pack_cone(cone);
+        }
+        Some(packed)
+    }
+
+    /// The entry. Any bits give one.
+    pub fn unpack(&self) -> MomentEntry {
+        let header = u32::from_le_bytes(self.header);
+        let count = (header >> SAMPLES_BITS & ((1 << COUNT_BITS) - 1)) as usize;
+        let mut cones = [MomentCone::default(); CONES];
+        for (to, bytes) in cones.iter_mut().zip(&self.cones) {
+            *to = unpack_cone(bytes);
+        }
+        MomentEntry::from_parts(
+            &cones[..count.min(CONES)],
+            self.confidence(),
+            header >> (SAMPLES_BITS + COUNT_BITS),
+        )
+    }
+
+    /// Header and cones.
+    pub fn to_parts(&self) -> ([u8; 4], [[u8; 14]; CONES]) {
+        (self.header, self.cones)
+    }
+
+    /// From [`PackedMoment::to_parts`]. Any bytes will do.
+    pub fn from_parts(header: [u8; 4], cones: [[u8; 14]; CONES]) -> PackedMoment<CONES> {
+        PackedMoment { header, cones }
+    }
+}
+
+fn pack_cone(cone: &MomentCone) -> [u8; 14] {
+    let mut bytes = [0; 14];
+    let mut writer = BitWriter::new(&mut bytes);
+    for component in flatten(cone.direction()).to_array() {
+        writer.put(((component.clamp(-1.0, 1.0) + 1.0) * DIRECTION_STEPS).round() as u32, 13);
+    }
+    writer.put(((cone.angle() / PI).sqrt() * ANGLE_STEPS).round() as u32, 12);
+    for channel in cone.energy.to_array() {
+        writer.put(energy_to_bits(channel), 18);
+    }
+    writer.put(cone.lights.bits(), LIGHT_SET_BITS as usize);
+    bytes
+}
+
+fn unpack_cone(bytes: &[u8; 14]) -> MomentCone {
+    let mut reader = BitReader::new(bytes);
+    let place = [0; 2].map(|_| (reader.take(13) as f32 / DIRECTION_STEPS - 1.0).min(1.0));
+    let root = reader.take(12) as f32 / ANGLE_STEPS;
+    let energy = Vec3::from_array([0; 3].map(|_| energy_from_bits(reader.take(18))));
+    let lights = LightSet::from_bits(reader.take(LIGHT_SET_BITS as usize));
+    MomentCone::from_cap(unflatten(Vec2::from_array(place)), libm::cosf(PI * root * root), energy, lights)
+}
+
+impl<const CONES: usize> ConeEntry for PackedMoment<CONES> {
+    fn confidence(&self) -> u16 {
+        (u32::from_le_bytes(self.header) & ((1 << SAMPLES_BITS) - 1)) as u16
+    }
+
+    fn cut_confidence(&mut self, most: u16) {
+        let samples = u32::from(self.confidence().min(most));
+        let header = u32::from_le_bytes(self.header) & !((1 << SAMPLES_BITS) - 1) | samples;
+        self.header = header.to_le_bytes();
+    }
+}
