@@ -6,7 +6,10 @@ use glam::Vec3;
 pub const MOST_ENERGY: f32 = 1e15;
 
 /// An entry whose energy is below this, in the samples' unit, is dark. It is what keeps squares in the range of a float.
-pub(super) const LEAST_ENERGY: f32 = 1e-15;
+pub(super) const LEAST_ENERGY: f32 = 1e-12;
+
+/// A cone that decayed below this is gone.
+pub(super) const GONE: f32 = 1e-14;
 
 /// A sample of light that reached a place: x_i, with its direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +30,7 @@ impl ConeSample {
         if !self.value.is_finite() || luminance(value) < LEAST_ENERGY {
             return None;
         }
-        Some((value, self.direction.try_normalize()?))
+        Some((value, unit(self.direction)?))
     }
 }
 
@@ -69,6 +72,12 @@ pub(super) fn check_rules(rules: impl IntoIterator<Item = Rule>) -> Result<(), C
 /// Luminance of linear red, green and blue (Rec. 709).
 pub fn luminance(colour: Vec3) -> f32 {
     0.2126 * colour.x + 0.7152 * colour.y + 0.0722 * colour.z
+}
+
+/// A vector's direction, unless its length is out of all measure: squares of very small numbers lose their bits.
+pub(super) fn unit(v: Vec3) -> Option<Vec3> {
+    let length_squared = v.length_squared();
+    (1e-34..1e34).contains(&length_squared).then(|| v / length_squared.sqrt())
 }
 
 /// Angle between unit vectors, radians.

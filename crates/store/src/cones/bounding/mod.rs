@@ -11,7 +11,9 @@ mod tests;
 
 use glam::Vec3;
 
-use super::entry::{ConeEntry, ConeError, ConeSample, LEAST_ENERGY, angle_between, check_rules, luminance};
+use super::entry::{
+    ConeEntry, ConeError, ConeSample, GONE, LEAST_ENERGY, angle_between, check_rules, luminance, unit,
+};
 pub use probe::Probe;
 
 /// Most cones of a [`BoundingEntry`].
@@ -133,7 +135,7 @@ impl BoundingEntry {
         let mut entry = BoundingEntry { samples, taken, ..BoundingEntry::default() };
         for cone in cones.iter().take(MOST_BOUNDING_CONES) {
             let valid = cone.energy.is_finite() && cone.energy.min_element() >= 0.0 && cone.angle.is_finite();
-            if let Some(direction) = cone.direction.try_normalize()
+            if let Some(direction) = unit(cone.direction)
                 && valid
                 && luminance(cone.energy) >= LEAST_ENERGY
             {
@@ -220,7 +222,7 @@ impl BoundingEntry {
 
     fn drop_dark(&mut self) {
         for i in (0..usize::from(self.count)).rev() {
-            if luminance(self.cones[i].energy) < LEAST_ENERGY * 1e-4 {
+            if luminance(self.cones[i].energy) < GONE {
                 self.remove(i);
             }
         }

@@ -5,7 +5,7 @@ use std::f32::consts::{PI, TAU};
 use glam::Vec3;
 
 use super::cap::turn_towards;
-use super::{BoundingEntry, BoundingParams, Cycle, angle_between};
+use super::{BoundingEntry, BoundingParams, Cycle, angle_between, unit};
 
 /// What a ray near the rim of a cone met.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +39,7 @@ impl BoundingEntry {
             if probe.cone >= usize::from(self.count) {
                 continue;
             }
-            let Some(direction) = probe.direction.try_normalize() else { continue };
+            let Some(direction) = unit(probe.direction) else { continue };
             let cone = &mut self.cones[probe.cone];
             if cone.angle < params.small_rad {
                 discarded |= u8::from(params.discard) << probe.cone;

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::super::entry::{LEAST_ENERGY, angle_between, luminance};
+use super::super::entry::{GONE, angle_between, luminance};
 use super::{MOST_MOMENT_CONES, MomentCone, MomentEntry, MomentParams};
 
 /// Cones are not taken to be narrower than this, radians, when it is asked what lies inside: samples of a light
@@ -84,7 +84,7 @@ impl MomentEntry {
     /// Leaves out cones that decayed to nothing.
     pub(super) fn drop_dark(&mut self) {
         for i in (0..usize::from(self.count)).rev() {
-            if luminance(self.cones[i].energy) < LEAST_ENERGY * 1e-4 {
+            if luminance(self.cones[i].energy) < GONE {
                 self.remove(i);
             }
         }

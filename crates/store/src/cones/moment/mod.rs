@@ -9,7 +9,9 @@ mod tests;
 
 use glam::Vec3;
 
-use super::entry::{ConeEntry, ConeError, ConeSample, LEAST_ENERGY, check_rules, luminance};
+use super::entry::{
+    ConeEntry, ConeError, ConeSample, GONE, LEAST_ENERGY, MOST_ENERGY, check_rules, luminance, unit,
+};
 use super::lights::LightSet;
 
 /// Most cones of a [`MomentEntry`].
@@ -88,14 +90,14 @@ pub struct MomentCone {
 impl MomentCone {
     /// Unit vector along the cone's axis: the mean direction of its light. +Z where opposite directions cancel.
     pub fn direction(&self) -> Vec3 {
-        self.moment.normalize_or(Vec3::Z)
+        unit(self.moment).unwrap_or(Vec3::Z)
     }
 
     /// Cosine of the opening angle (axis to rim), −1 … 1: that of the cap which, evenly bright, has the same moment, for which
     /// |m| / lum(E) = (1 + cos a) / 2.
     pub fn cos_angle(&self) -> f32 {
         let luminance = luminance(self.energy);
-        if luminance < LEAST_ENERGY * 1e-4 {
+        if luminance < GONE {
             return 1.0;
         }
         (2.0 * self.moment.length() / luminance - 1.0).clamp(-1.0, 1.0)
@@ -231,7 +233,7 @@ impl MomentEntry {
     /// of it is taken to stay the same share. Returns how many cones did; cones of several lights stay. Arguments that are
     /// not finite, or negative ratios, change nothing.
     pub fn re_aim(&mut self, aim: &ReAim) -> usize {
-        let (Some(from), Some(to)) = (aim.from.try_normalize(), aim.to.try_normalize()) else { return 0 };
+        let (Some(from), Some(to)) = (unit(aim.from), unit(aim.to)) else { return 0 };
         let valid = |ratio: f32| ratio.is_finite() && ratio >= 0.0;
         if !valid(aim.energy_ratio) || !valid(aim.size_ratio) {
             return 0;
@@ -243,7 +245,7 @@ impl MomentEntry {
             }
             let direction = turn(cone.direction(), from, to);
             let angle = (cone.angle() * aim.size_ratio).min(std::f32::consts::PI);
-            let energy = (cone.energy * aim.energy_ratio).min(Vec3::splat(MOST_RE_AIMED));
+            let energy = (cone.energy * aim.energy_ratio).min(Vec3::splat(MOST_ENERGY));
             *cone = MomentCone::from_cap(direction, libm::cosf(angle), energy, cone.lights);
             turned += 1;
         }
@@ -251,9 +253,6 @@ impl MomentEntry {
         turned
     }
 }
-
-/// Re-aimed cones are not brighter than samples can be.
-const MOST_RE_AIMED: f32 = super::entry::MOST_ENERGY;
 
 impl ConeEntry for MomentEntry {
     fn confidence(&self) -> u16 {

@@ -12,17 +12,17 @@ use super::floats::{energy_from_bits, energy_to_bits};
 use crate::octahedral::{flatten, unflatten};
 
 /// Steps of a component of a direction on either side of 0.
-const DIRECTION_STEPS: f32 = 8191.0;
+const DIRECTION_STEPS: f32 = 4095.0;
 /// Steps of the square root of the opening angle.
-const ANGLE_STEPS: f32 = 1023.0;
+const ANGLE_STEPS: f32 = 4095.0;
 
 const SAMPLES_BITS: u32 = 12;
 const COUNT_BITS: u32 = 3;
 /// The rest of the header.
 const TAKEN_BITS: u32 = 32 - SAMPLES_BITS - COUNT_BITS;
 
-/// An entry of up to `CONES` cones in 4 + 14 · `CONES` bytes. A cone is an octahedral direction in 2 × 14 bits (within 3e-4 rad),
-/// the square root of the opening angle a in 10 (a within √(π a) / 1023 and 1e-5, so narrow cones stay as they are),
+/// An entry of up to `CONES` cones in 4 + 14 · `CONES` bytes. A cone is an octahedral direction in 2 × 13 bits (within 6e-4 rad),
+/// the square root of the opening angle a in 12 (a within √(π a) / 4095 and 1e-6, so narrow cones stay as they are),
 /// the energy as 3 × [`energy_to_bits`], the lights in 20. The moment follows from these. C is in 12 bits, samples taken
 /// are modulo 2¹⁷.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -85,9 +85,9 @@ fn pack_cone(cone: &MomentCone) -> [u8; 14] {
     let mut bytes = [0; 14];
     let mut writer = BitWriter::new(&mut bytes);
     for component in flatten(cone.direction()).to_array() {
-        writer.put(((component.clamp(-1.0, 1.0) + 1.0) * DIRECTION_STEPS).round() as u32, 14);
+        writer.put(((component.clamp(-1.0, 1.0) + 1.0) * DIRECTION_STEPS).round() as u32, 13);
     }
-    writer.put(((cone.angle() / PI).sqrt() * ANGLE_STEPS).round() as u32, 10);
+    writer.put(((cone.angle() / PI).sqrt() * ANGLE_STEPS).round() as u32, 12);
     for channel in cone.energy.to_array() {
         writer.put(energy_to_bits(channel), 18);
     }
@@ -97,8 +97,8 @@ fn pack_cone(cone: &MomentCone) -> [u8; 14] {
 
 fn unpack_cone(bytes: &[u8; 14]) -> MomentCone {
     let mut reader = BitReader::new(bytes);
-    let place = [0; 2].map(|_| (reader.take(14) as f32 / DIRECTION_STEPS - 1.0).min(1.0));
-    let root = reader.take(10) as f32 / ANGLE_STEPS;
+    let place = [0; 2].map(|_| (reader.take(13) as f32 / DIRECTION_STEPS - 1.0).min(1.0));
+    let root = reader.take(12) as f32 / ANGLE_STEPS;
     let energy = Vec3::from_array([0; 3].map(|_| energy_from_bits(reader.take(18))));
     let lights = LightSet::from_bits(reader.take(LIGHT_SET_BITS as usize));
     MomentCone::from_cap(unflatten(Vec2::from_array(place)), libm::cosf(PI * root * root), energy, lights)
