@@ -1,0 +1,4 @@
+//! Closed forms of direct light for every method, and what no light or material may break.
+
+mod stage;
+mod traced;
