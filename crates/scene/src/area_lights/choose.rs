@@ -54,6 +54,12 @@ impl Chooser {
         weight_of(sums, light) / total
     }
 
+    /// The light that `u` in `[0, 1)` picks, its probability, and what is left of `u`, again in `[0, 1)`, for
+    /// [`AreaLights::sample_light`]; `None` if nothing can arrive.
+    pub fn pick(&self, lights: &AreaLights<'_>, u: f32) -> Option<(u32, f32, f32)> {
+        self.choose(&lights.power, u)
+    }
+
     fn sums<'s>(&'s self, power: &'s [f32]) -> &'s [f32] {
         if self.pick == Pick::Power { power } else { &self.sums }
     }

@@ -5,6 +5,9 @@
 //!
 //! `README.md` has equations, parameters, cost and failure cases.
 
+mod reservoir;
+mod restir;
+mod ris;
 mod sequence;
 #[cfg(test)]
 mod tests;
@@ -17,10 +20,12 @@ use dapple_scene::area_lights::{AreaLights, Chooser, LightSample, Pick};
 use dapple_scene::glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+pub use restir::{NO_PIXEL, Past, Restir, RestirParams, RestirView};
+pub use ris::{RisParams, trace_ris};
 pub use sequence::Sequence;
 
-use crate::bvh::{MAX_DIRECTIONS, Tracer, offset_origin};
-pub(crate) use sequence::Draws;
+use crate::bvh::{MAX_DIRECTIONS, Ray, Tracer, offset_origin};
+use sequence::Draws;
 
 /// Most samples a pixel.
 pub const MAX_SAMPLES: u32 = 65_536;
@@ -106,7 +111,7 @@ pub fn trace_direct_with_progress(
     })
 }
 
-/// Fills a picture in parallel; each task has buffers of its own. Points that are not there or not finite are left black.
+/// Fills a picture from its points; those that are not there, or not finite, are left black.
 fn trace_each(
     points: &[Option<ShadingPoint>],
     out: &mut [Vec3],
@@ -114,29 +119,39 @@ fn trace_each(
     progress: &(dyn Fn(u64) + Sync),
     trace: impl Fn(&mut Worker, u64, &ShadingPoint) -> Vec3 + Sync,
 ) -> DirectCost {
-    let done = AtomicU64::new(0);
-    let chunks = points.par_chunks(CHUNK).zip(out.par_chunks_mut(CHUNK)).enumerate();
-    chunks
-        .map(|(chunk, (points, out))| {
-            let mut worker = Worker::new(pick);
-            for (i, (point, out)) in points.iter().zip(out).enumerate() {
-                let site = (chunk * CHUNK + i) as u64;
-                let point = point.as_ref().filter(|p| is_usable(p));
-                *out = point.map_or(Vec3::ZERO, |p| trace(&mut worker, site, p));
-            }
-            let before = done.fetch_add(points.len() as u64, Ordering::Relaxed);
-            progress(before + points.len() as u64);
-            worker.cost
-        })
-        .reduce(DirectCost::default, |mut a, b| {
-            a += b;
-            a
-        })
+    update(out, pick, progress, |worker, i, out| {
+        *out = usable(points, i).map_or(Vec3::ZERO, |p| trace(worker, i as u64, p));
+    })
 }
 
-/// Whether rays can leave a point.
-fn is_usable(point: &ShadingPoint) -> bool {
-    point.position_world.is_finite() && point.normal_world.is_finite() && point.normal_world != Vec3::ZERO
+/// Goes over a list in parallel; each task has buffers of its own.
+fn update<T: Send>(
+    list: &mut [T],
+    pick: Pick,
+    progress: &(dyn Fn(u64) + Sync),
+    change: impl Fn(&mut Worker, usize, &mut T) + Sync,
+) -> DirectCost {
+    let done = AtomicU64::new(0);
+    let tasks = list.par_chunks_mut(CHUNK).enumerate().map(|(chunk, items)| {
+        let mut worker = Worker::new(pick);
+        for (i, item) in items.iter_mut().enumerate() {
+            change(&mut worker, chunk * CHUNK + i, item);
+        }
+        let before = done.fetch_add(items.len() as u64, Ordering::Relaxed);
+        progress(before + items.len() as u64);
+        worker.cost
+    });
+    tasks.reduce(DirectCost::default, |mut a, b| {
+        a += b;
+        a
+    })
+}
+
+/// A point that is there and that rays can leave.
+fn usable(points: &[Option<ShadingPoint>], index: usize) -> Option<&ShadingPoint> {
+    let point = points.get(index)?.as_ref()?;
+    let normal = point.normal_world;
+    (point.position_world.is_finite() && normal.is_finite() && normal != Vec3::ZERO).then_some(point)
 }
 
 /// Where rays leave a point. Places on lights are chosen from there too, so that a ray ends where its sample lies.
@@ -148,6 +163,12 @@ fn origin(point: &ShadingPoint) -> Vec3 {
 fn contribution(point: &ShadingPoint, sample: &LightSample) -> Option<Vec3> {
     let value = point.reflected(sample.to_light_world) * sample.radiance / sample.density_per_sr;
     (value.is_finite() && value != Vec3::ZERO).then_some(value)
+}
+
+/// Whether nothing stands along a vector.
+fn is_open(tracer: &Tracer, origin_world: Vec3, reach: Vec3, cost: &mut DirectCost) -> bool {
+    cost.rays += 1;
+    !tracer.occluded(&Ray { origin_world, direction_world: reach, t_max: 1.0 })
 }
 
 /// Buffers of one task.

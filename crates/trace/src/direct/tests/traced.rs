@@ -5,7 +5,7 @@ use std::sync::Mutex;
 
 use dapple_scene::EmitterShape::{Disc, Rectangle, Triangles};
 use dapple_scene::area_lights::{AreaLights, Environment, Pick};
-use dapple_scene::glam::{Affine3A, Mat3, Vec2, Vec3};
+use dapple_scene::glam::{Mat3, Vec2, Vec3};
 use dapple_scene::{Reflectance, ShadingPoint};
 
 use super::stage::{Stage, picture, point};
@@ -17,7 +17,7 @@ use crate::test_support::quad;
 pub(super) const PICKS: [Pick; 3] = [Pick::Uniform, Pick::Power, Pick::Fluence];
 const SEQUENCES: [Sequence; 2] = [Sequence::Random, Sequence::Lattice];
 
-/// Irradiance of a sixteenth of a picture of equal points under a light, and that of the closed form.
+/// Lights over the origin, the normal of a white point there, and its irradiance.
 pub(super) fn closed_forms() -> Vec<(&'static str, Stage, Vec3, f32)> {
     let ball = |normal: Vec3| {
         let mut stage = Stage::default();
@@ -310,5 +310,4 @@ fn numbers_of_samples_out_of_range_are_brought_into_it() {
         let (_, cost) = trace(&stage, &lights, &[Some(point(Vec3::Y))], &params);
         assert_eq!(cost.samples, u64::from(drawn));
     }
-    let _ = Affine3A::IDENTITY;
 }
