@@ -5,26 +5,26 @@ mod bench;
 mod bit_rate;
 mod effort;
 mod eval;
+mod method;
 mod serve;
+mod values;
 mod verbs;
 mod view;
 mod watch;
 mod worker;
 
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use dapple_scene::glam::Vec3;
-
-use crate::screen_space::ScreenSpace;
 
 pub(crate) use bake::BakeArgs;
 pub(crate) use bench::{Bench, BenchArgs, JoinArgs, ServedArgs, SoakArgs, ViewersArgs};
 pub(crate) use bit_rate::BitRate;
 pub(crate) use effort::EffortArgs;
 pub(crate) use eval::{EvalArgs, Options, ScenesArgs};
+pub(crate) use method::{Method, RenderMethod};
 pub(crate) use serve::{LogFormat, Named, ServeArgs};
+pub(crate) use values::{CameraText, Radius, Size};
 pub(crate) use verbs::{CompareArgs, DiffArgs, ErrorMap, EvalVerb, JudgeArgs, PictureFormat, ReferenceArgs};
 pub(crate) use view::{Preset, ViewArgs, ViewKind, ViewMethod};
 pub(crate) use watch::{DemoArgs, InspectArgs, LightArgs, RecordArgs};
@@ -245,36 +245,6 @@ pub(crate) struct SceneArgs {
     pub(crate) output: Option<PathBuf>,
 }
 
-/// A method as `render` names it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum RenderMethod {
-    /// Points, reconstructed by moving least squares.
-    Psao,
-    /// Points, reconstructed by the paper's kernel.
-    PsaoHat,
-    /// Rays at every pixel: the truth.
-    Rtao,
-    /// From the picture alone.
-    Screen(ScreenSpace),
-    None,
-}
-
-impl FromStr for RenderMethod {
-    type Err = String;
-
-    fn from_str(s: &str) -> Result<Self, Self::Err> {
-        match s {
-            "psao" => Ok(RenderMethod::Psao),
-            "psao-hat" => Ok(RenderMethod::PsaoHat),
-            "rtao" => Ok(RenderMethod::Rtao),
-            "none" => Ok(RenderMethod::None),
-            name => ScreenSpace::from_name(name)
-                .map(RenderMethod::Screen)
-                .ok_or_else(|| format!("known methods: psao, psao-hat, rtao, {}, none", ScreenSpace::KNOWN)),
-        }
-    }
-}
-
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum View {
     /// The shaded picture.
@@ -289,185 +259,6 @@ pub(crate) enum View {
     Points,
 }
 
-/// A method as `eval` names it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Method {
-    /// Through the visibility atlas.
-    Psao,
-    /// Least squares at every sample.
-    PsaoMls,
-    /// With the radius in units of the spacing.
-    PsaoHat {
-        radius: f32,
-    },
-    /// The paper's whole scheme, server, wire and client.
-    PsaoPaper,
-    /// The paper's scheme with least squares at every sample.
-    PsaoPaperMls,
-    /// Shading atlas streaming, with so many pixels of a side to a texel.
-    Sas {
-        bias: u32,
-    },
-    Rtao {
-        rays: u32,
-    },
-    /// From the picture's depth and normals alone.
-    Screen(ScreenSpace),
-    None,
-}
-
-impl Method {
-    /// Whether it depends on points and server rate.
-    pub(crate) fn uses_points(self) -> bool {
-        matches!(self, Method::Psao | Method::PsaoMls | Method::PsaoHat { .. }) || self.is_paper()
-    }
-
-    /// Whether its server and its stream are the paper's.
-    pub(crate) fn is_paper(self) -> bool {
-        matches!(self, Method::PsaoPaper | Method::PsaoPaperMls)
-    }
-}
-
-impl std::fmt::Display for Method {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Method::Psao => write!(f, "psao"),
-            Method::PsaoMls => write!(f, "psao-mls"),
-            Method::PsaoHat { radius: 1.0 } => write!(f, "psao-hat"),
-            Method::PsaoHat { radius } => write!(f, "psao-hat-{radius}"),
-            Method::PsaoPaper => write!(f, "psao-paper"),
-            Method::PsaoPaperMls => write!(f, "psao-paper-mls"),
-            Method::Sas { bias } => write!(f, "sas-{bias}"),
-            Method::Rtao { rays } => write!(f, "rtao-{rays}"),
-            Method::Screen(method) => write!(f, "{}", method.name()),
-            Method::None => write!(f, "none"),
-        }
-    }
-}
-
-impl FromStr for Method {
-    type Err = String;
-
-    fn from_str(s: &str) -> Result<Self, Self::Err> {
-        match s {
-            "psao" => Ok(Method::Psao),
-            "psao-mls" => Ok(Method::PsaoMls),
-            "psao-hat" => Ok(Method::PsaoHat { radius: 1.0 }),
-            "psao-paper" => Ok(Method::PsaoPaper),
-            "psao-paper-mls" => Ok(Method::PsaoPaperMls),
-            "none" => Ok(Method::None),
-            "rtao" => Ok(Method::Rtao { rays: 16 }),
-            _ => {
-                if let Some(method) = ScreenSpace::from_name(s) {
-                    return Ok(Method::Screen(method));
-                }
-                let rays = s.strip_prefix("rtao-").and_then(|r| r.parse().ok());
-                let radius = s.strip_prefix("psao-hat-").and_then(|r| r.parse::<f32>().ok());
-                let bias = s.strip_prefix("sas-").and_then(|b| b.parse().ok());
-                match (rays, radius, bias) {
-                    (Some(rays @ 1..=65536), ..) => Ok(Method::Rtao { rays }),
-                    (_, Some(radius), _) if (0.1..=8.0).contains(&radius) => Ok(Method::PsaoHat { radius }),
-                    (.., Some(bias @ 1..=1024)) => Ok(Method::Sas { bias }),
-                    _ => Err(format!(
-                        "known methods: psao, psao-mls, psao-hat, psao-hat-F with its radius times F from 0.1 to 8, \
-                         psao-paper, psao-paper-mls, sas-B with B from 1 to 1024, rtao-R with R from 1 to 65536 (rtao-16), \
-                         {}, none",
-                        ScreenSpace::KNOWN
-                    )),
-                }
-            }
-        }
-    }
-}
-
-/// Picture size.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Size {
-    pub(crate) width: u32,
-    pub(crate) height: u32,
-}
-
-impl FromStr for Size {
-    type Err = String;
-
-    fn from_str(s: &str) -> Result<Self, Self::Err> {
-        let parsed = s.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
-        match parsed {
-            Some((width @ 1..=16384, height @ 1..=16384)) => Ok(Size { width, height }),
-            _ => Err("write WIDTHxHEIGHT in pixels, each 1 to 16384, as in 1280x720".into()),
-        }
-    }
-}
-
-impl std::fmt::Display for Size {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}x{}", self.width, self.height)
-    }
-}
-
-/// Occlusion distance.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Radius {
-    Auto,
-    Metres(f32),
-}
-
-impl FromStr for Radius {
-    type Err = String;
-
-    fn from_str(s: &str) -> Result<Self, Self::Err> {
-        if s == "auto" {
-            return Ok(Radius::Auto);
-        }
-        match s.parse::<f32>() {
-            Ok(m) if m.is_finite() && m > 0.0 => Ok(Radius::Metres(m)),
-            _ => Err("write a length in metres above 0, or auto".into()),
-        }
-    }
-}
-
-/// A camera given on the command line.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct CameraText {
-    pub(crate) eye: Vec3,
-    pub(crate) target: Vec3,
-    pub(crate) fov_degrees: f32,
-}
-
-impl FromStr for CameraText {
-    type Err = String;
-
-    fn from_str(s: &str) -> Result<Self, Self::Err> {
-        let help = || format!("'{s}' is no camera: write eye=X,Y,Z,target=X,Y,Z,fov=DEGREES");
-        // Commas separate both numbers and keys: a part with `=` opens the next key.
-        let mut groups: Vec<(&str, Vec<f32>)> = Vec::new();
-        for part in s.split(',') {
-            let number = match part.split_once('=') {
-                Some((key, number)) => {
-                    groups.push((key.trim(), Vec::new()));
-                    number
-                }
-                None => part,
-            };
-            let number = number.trim().parse::<f32>().ok().filter(|n| n.is_finite()).ok_or_else(help)?;
-            groups.last_mut().ok_or_else(help)?.1.push(number);
-        }
-        let (mut eye, mut target, mut fov) = (None, None, 60.0f32);
-        for (key, numbers) in groups {
-            match (key, numbers.as_slice()) {
-                ("eye", &[x, y, z]) => eye = Some(Vec3::new(x, y, z)),
-                ("target", &[x, y, z]) => target = Some(Vec3::new(x, y, z)),
-                ("fov", &[degrees]) if degrees > 0.0 && degrees < 180.0 => fov = degrees,
-                _ => return Err(help()),
-            }
-        }
-        match (eye, target) {
-            (Some(eye), Some(target)) if eye != target => Ok(CameraText { eye, target, fov_degrees: fov }),
-            _ => Err(help()),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -476,46 +267,5 @@ mod tests {
     fn the_command_line_is_consistent() {
         use clap::CommandFactory;
         Cli::command().debug_assert();
-    }
-
-    #[test]
-    fn cameras_are_read_in_any_order() {
-        let expected = CameraText { eye: Vec3::new(1.0, -2.5, 30.0), target: Vec3::ZERO, fov_degrees: 45.0 };
-        for text in ["eye=1,-2.5,3e1,target=0,0,0,fov=45", "fov=45,target=0,0,0,eye=1,-2.5,30"] {
-            assert_eq!(text.parse(), Ok(expected), "{text}");
-        }
-        for text in [
-            "",
-            "eye=1,2,target=0,0,0",
-            "eye=0,0,0,target=0,0,0",
-            "eye=1,2,3",
-            "eye=a,b,c,target=0,0,0",
-            "fov=190",
-        ] {
-            assert!(text.parse::<CameraText>().is_err(), "{text}");
-        }
-    }
-
-    #[test]
-    fn sizes_methods_and_radii_refuse_nonsense() {
-        assert_eq!("640x360".parse(), Ok(Size { width: 640, height: 360 }));
-        for text in ["0x1", "640", "640x", "99999x1", "-1x2"] {
-            assert!(text.parse::<Size>().is_err(), "{text}");
-        }
-        assert_eq!("rtao-512".parse(), Ok(Method::Rtao { rays: 512 }));
-        let screen = ScreenSpace::ALL.map(Method::Screen);
-        for method in [Method::PsaoPaper, Method::PsaoPaperMls, Method::PsaoHat { radius: 1.5 }]
-            .into_iter()
-            .chain(screen)
-        {
-            assert_eq!(method.to_string().parse(), Ok(method));
-        }
-        for text in ["rtao-0", "rtao-x", "ssao-16", "magic", ""] {
-            assert!(text.parse::<Method>().is_err(), "{text}");
-        }
-        assert_eq!("auto".parse(), Ok(Radius::Auto));
-        for text in ["0", "-1", "nan", "inf", "wide"] {
-            assert!(text.parse::<Radius>().is_err(), "{text}");
-        }
     }
 }

@@ -5,9 +5,7 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use dapple_render::gbuffer::{GBuffer, GuardBand, Layers, Screen};
 use dapple_render::screen_space::{ScreenKind, ScreenMethod};
-use dapple_render::sdao::{
-    Lookup, MapParams, SideParams, SideView, StochasticMap, bent_normals, estimate_visibility_of_two,
-};
+use dapple_render::sdao::{Lookup, MapParams, SideParams, SideView, StochasticMap, bent_normals};
 use dapple_render::{AfterPass, Chosen, Preset, RenderError, upsample};
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Pose, PosedCamera, Scene};
@@ -46,7 +44,7 @@ pub(crate) enum Layered {
 pub(crate) struct Stochastic {
     /// Of each sample of the picture: 1, 2, 4, 8 or 16.
     pub(crate) samples: u32,
-    /// Of a second camera beside the first one, too; HBAO+ alone.
+    /// Of a second camera beside the first one, too; SSAO and HBAO+ alone.
     pub(crate) two_cameras: bool,
     /// The paper's parameters, not those that are best here.
     pub(crate) paper: bool,
@@ -158,7 +156,7 @@ pub(crate) struct Estimate {
 
 impl ScreenSpace {
     /// Those without parameters in their names, the simplest first.
-    pub(crate) const ALL: [ScreenSpace; 13] = [
+    pub(crate) const ALL: [ScreenSpace; 14] = [
         ScreenSpace::Ssao,
         ScreenSpace::Alchemy,
         ScreenSpace::Sao,
@@ -168,6 +166,7 @@ impl ScreenSpace {
         ScreenSpace::Stochastic(Layered::Ssao, Stochastic::DEFAULT),
         ScreenSpace::Stochastic(Layered::Hbao, Stochastic::DEFAULT),
         ScreenSpace::Stochastic(Layered::HbaoPlus, Stochastic::DEFAULT),
+        ScreenSpace::Stochastic(Layered::Ssao, Stochastic::TWO_CAMERAS),
         ScreenSpace::Stochastic(Layered::HbaoPlus, Stochastic::TWO_CAMERAS),
         ScreenSpace::Peeled(Layered::Ssao),
         ScreenSpace::Peeled(Layered::Hbao),
@@ -176,7 +175,7 @@ impl ScreenSpace {
 
     /// What names there are, for messages.
     pub(crate) const KNOWN: &str = "ssao, alchemy, sao, hbao, hbao-plus, gtao, sd-ssao, sd-hbao, sd-hbao-plus and these with -S for 1, 2, 4, \
-                                    8 or 16 samples, sd-hbao-plus-mv, -paper after any of them, ssao-peeled, hbao-peeled, hbao-plus-peeled";
+                                    8 or 16 samples, sd-ssao-mv, sd-hbao-plus-mv, -paper after any of them, ssao-peeled, hbao-peeled, hbao-plus-peeled";
 
     /// By the name that `eval` and `render` give it.
     pub(crate) fn from_name(name: &str) -> Option<ScreenSpace> {
@@ -194,7 +193,7 @@ impl ScreenSpace {
             _ => (rest, Stochastic::DEFAULT.samples),
         };
         let method = Layered::ALL.into_iter().find(|method| method.name() == rest)?;
-        let is_possible = !two_cameras || method == Layered::HbaoPlus;
+        let is_possible = !two_cameras || method != Layered::Hbao;
         is_possible.then_some(ScreenSpace::Stochastic(method, Stochastic { samples, two_cameras, paper }))
     }
 
@@ -283,11 +282,8 @@ impl ScreenSpace {
         let known = self.known(screen, sight, effort, half_resolution, after)?;
         let known = if half_resolution { known.half() } else { known };
         let lookup = known.lookup(effort.compensation);
-        let run = |screen: &Screen, after: AfterPass<'_>| match (&method, &known.side) {
-            (ScreenMethod::Hbao(params), Some(side)) => {
-                estimate_visibility_of_two(screen, params, &lookup, side, after)
-            }
-            _ => method.estimate_by_passes(screen, &lookup, after),
+        let run = |screen: &Screen, after: AfterPass<'_>| {
+            method.estimate_by_passes(screen, &lookup, known.side.as_ref(), after)
         };
         if half_resolution { upsample::at_half_resolution(screen, after, run) } else { run(screen, after) }
     }
@@ -310,9 +306,9 @@ impl ScreenSpace {
                 let mut known = Known { map: Some(map), is_paper: stochastic.paper, ..Known::default() };
                 if stochastic.two_cameras {
                     let size = [screen.columns(), screen.rows()];
-                    // As coarse as the first.
-                    let coarseness = effort.second_coarseness * if half_resolution { 2 } else { 1 };
+                    let coarseness = effort.second_coarseness;
                     let second = SideParams { coarseness, ..SideParams::default() };
+                    let second = if half_resolution { second.half() } else { second };
                     known.side = Some(SideView::draw(scene, pose, camera, size, &second, &params)?);
                     after("second map");
                 }
@@ -385,6 +381,7 @@ mod tests {
             "sd-ssao-1",
             "sd-hbao-16",
             "sd-hbao-plus-2",
+            "sd-ssao-8-mv",
             "sd-hbao-plus-8-mv",
             "sd-hbao-plus-paper",
             "sd-hbao-plus-16-mv-paper",

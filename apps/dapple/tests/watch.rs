@@ -152,6 +152,9 @@ fn what_cannot_be_shown_is_named() {
         (&["view", "sheet.glb", "--time", "-1"], &["--time"]),
         (&["view", "sheet.glb", "--split", "2"], &["--split"]),
         (&["view", "sheet.glb", "--fade", "-1"], &["--fade"]),
+        (&["view", "sheet.glb", "--second-camera"], &["--second-camera", "sd-ssao or sd-hbao-plus"]),
+        (&["view", "sheet.glb", "--method", "sd-hbao", "--second-camera"], &["--second-camera"]),
+        (&["view", "sheet.glb", "--method", "sd-ssao", "--second-camera=-1"], &["--second-camera", "above 0"]),
         (&["view", "sheet.glb", "--camera", "roof"], &["roof", "front"]),
         (&["view", "sheet.glb", "--view", "depth"], &["depth", "beauty"]),
         (&["view", "sheet.glb", "--frames", "3"], &["--headless"]),
@@ -191,6 +194,28 @@ fn headless(at: &Path, arguments: &[&str]) -> Option<String> {
     }
     assert!(output.status.success(), "{arguments:?}: {out}\n{err}");
     Some(out)
+}
+
+#[test]
+fn a_second_camera_sees_more() {
+    let folder = folder();
+    let at = folder.path();
+    let common = ["--builtin", "atrium", "--detail", "0.1", "--points", "20", "--size", "160x90", "--view", "visibility"];
+    for method in ["sd-ssao", "sd-hbao-plus"] {
+        let names = [format!("{method}-one"), format!("{method}-two")];
+        for (name, second) in names.iter().zip([None, Some("--second-camera=1.5")]) {
+            let own = ["--method", method, "-o", name];
+            let arguments: Vec<_> = common.into_iter().chain(own).chain(second).collect();
+            let Some(said) = headless(at, &arguments) else { return };
+            assert!(said.contains("1 picture"), "{said}");
+        }
+        let [one, two] =
+            names.map(|name| image::open(at.join(name).join("frame-000.png")).unwrap().to_luma8());
+        // Darker somewhere, and nowhere brighter by more than rounding.
+        let off: Vec<i32> = one.iter().zip(two.iter()).map(|(a, b)| i32::from(*b) - i32::from(*a)).collect();
+        assert!(off.iter().all(|off| *off <= 1), "{method}");
+        assert!(off.iter().filter(|off| **off < -5).count() > 100, "{method}");
+    }
 }
 
 #[test]

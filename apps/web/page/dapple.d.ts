@@ -175,6 +175,8 @@ export interface Options {
   aoPreset?: "low" | "medium" | "high" | "ultra";
   /** Of the same: whether they look at a quarter of the samples. Default: as the preset has it. */
   halfResolution?: boolean;
+  /** Of `sd-ssao` and `sd-hbao-plus` (WebGPU): how far to the right a second camera stands, metres, which sees what the first one looks along. Default none. */
+  secondCamera?: number;
   /** Default `beauty`. */
   view?: View;
   /** Another method right of a part (0 to 1) of the width. Default none. */

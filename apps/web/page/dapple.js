@@ -95,9 +95,10 @@ class Viewer {
   #apply() {
     const { method, view, split, camera, time, loop = true, paused = false, fade, live } = this.#options;
     const { fallback, radius = NaN, guardBand = NaN, aoPreset = "high", halfResolution } = this.#options;
+    const { secondCamera = 0 } = this.#options;
     if (method) this.setMethod(method);
     if (fallback) this.#core.setFallback(fallback);
-    this.#core.setScreenSpace(radius, guardBand, aoPreset, halfResolution);
+    this.#core.setScreenSpace(radius, guardBand, aoPreset, halfResolution, secondCamera);
     if (view) this.setView(view);
     if (split) this.setSplit(split.position, split.method);
     if (camera) this.setCamera(camera);

@@ -17,7 +17,7 @@ const STAGES = {
   stream: "Fetching the light",
   light: "Laying out the light",
 };
-const NUMBERS = ["time", "shadowResolution", "samples", "fade", "radius", "guardBand", "maxPixelRatio", "animation"];
+const NUMBERS = ["time", "shadowResolution", "samples", "fade", "radius", "guardBand", "secondCamera", "maxPixelRatio", "animation"];
 const FLAGS = ["paused", "loop", "halfResolution"];
 const WORDS = ["scene", "stream", "live", "token", "transport", "backend", "method", "fallback", "aoPreset", "view", "camera"];
 

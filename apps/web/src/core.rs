@@ -5,6 +5,7 @@ use std::sync::Arc;
 use dapple_client::clock::Clock;
 use dapple_client::rate::Rate;
 use dapple_client::viewer::{DebugView, DrawOptions, LoadProgress, ScreenOptions, Viewer, ViewerConfig};
+use dapple_render::sdao::SideParams;
 use dapple_render::shade::ShadeParams;
 use dapple_scene::{NoFiles, Scene, Spare};
 use dapple_stream::{Limits, Recording, Replay};
@@ -251,7 +252,8 @@ impl Core {
     }
 
     /// Of methods that look at the picture alone: how far away what blocks may be, metres; how far beyond the picture is looked, as a part
-    /// of its height; how much work they do, by name; whether at half the resolution, if not as the preset has it.
+    /// of its height; how much work they do, by name; whether at half the resolution, if not as the preset has it; how far to the right a second camera
+    /// stands, metres, where a method takes one: 0 or less for none.
     #[wasm_bindgen(js_name = setScreenSpace)]
     pub fn set_screen_space(
         &mut self,
@@ -259,14 +261,17 @@ impl Core {
         guard_band: f32,
         preset: &str,
         half_resolution: Option<bool>,
+        second_camera_m: f32,
     ) -> Result<(), JsError> {
         let usual = ScreenOptions::default();
-        let positive = radius_m.is_finite() && radius_m > 0.0;
+        let is_positive = |metres: f32| metres.is_finite() && metres > 0.0;
         self.options.screen = ScreenOptions {
-            radius_m: if positive { radius_m } else { usual.radius_m },
+            radius_m: if is_positive(radius_m) { radius_m } else { usual.radius_m },
             guard_band: if guard_band.is_finite() { guard_band.clamp(0.0, 0.5) } else { usual.guard_band },
             preset: names::effort(preset)?,
             half_resolution,
+            second_camera: is_positive(second_camera_m)
+                .then(|| SideParams { aside_m: second_camera_m, ..SideParams::default() }),
         };
         self.changed = true;
         Ok(())

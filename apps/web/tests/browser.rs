@@ -290,7 +290,7 @@ fn the_handle_plays_seeks_and_steers() {
                 "name": backend, "width": 320, "height": 180,
                 "scripts": [{ "name": backend, "script": script }],
                 "query": format!(
-                    "{}&backend={backend}&shadowResolution=64&samples=1&maxPixelRatio=0.3", prepared.query(),
+                    "{}&backend={backend}&shadowResolution=64&samples=1&maxPixelRatio=0.3&secondCamera=2", prepared.query(),
                 ),
             })
         })

@@ -92,7 +92,7 @@ pub(crate) struct Options {
     /// radius), psao-paper (the paper's whole scheme; psao-paper-mls: with the fit of psao-mls), sas-B (shading
     /// atlas streaming with B pixels of a side to a texel; a program built with `--features sas`), rtao-R (R rays a pixel), ssao
     /// (screen-space occlusion as in Falcor's defaults), alchemy, sao, hbao, hbao-plus, gtao (other screen-space methods), sd-ssao,
-    /// sd-hbao, sd-hbao-plus (over a stochastic depth map of 4 samples; sd-hbao-16: of 16; sd-hbao-plus-mv: of two cameras; sd-hbao-paper: with the
+    /// sd-hbao, sd-hbao-plus (over a stochastic depth map of 4 samples; sd-hbao-16: of 16; sd-ssao-mv, sd-hbao-plus-mv: of two cameras; sd-hbao-paper: with the
     /// paper's parameters), ssao-peeled, hbao-peeled, hbao-plus-peeled (over all layers), none
     /// [default: psao,psao-hat,rtao-16,none].
     #[arg(long, value_delimiter = ',', value_name = "METHOD,…")]

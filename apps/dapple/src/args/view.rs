@@ -19,6 +19,7 @@ Examples:
   dapple view room.glb --stream room.dapple      plays a recording (dapple record)
   dapple view --url http://127.0.0.1:8000/       what a page there shows (dapple demo), or a live session (dapple serve)
   dapple view room.glb --camera walk.json        along a camera path that was recorded (R) or written by hand
+  dapple view --builtin atrium --method sd-hbao-plus --second-camera
   dapple view --builtin atrium --headless --frames 8 --view texels --size 640x360 -o out/texels
 
 In the window H or F1 lists the keys.";
@@ -73,6 +74,16 @@ pub(crate) struct ViewArgs {
     pub(crate) fallback: ViewMethod,
     #[command(flatten)]
     pub(crate) effort: EffortArgs,
+    /// sd-ssao and sd-hbao-plus see from a second camera, too, METRES to the right: what the first one looks along.
+    #[arg(
+        long,
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "2",
+        allow_negative_numbers = true,
+        value_name = "METRES"
+    )]
+    pub(crate) second_camera: Option<f32>,
     /// Seconds that an update fades in over; 0 for none [default: as long as updates are apart, at most half a second; 0 with --headless].
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) fade: Option<f32>,

@@ -22,6 +22,8 @@ use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use dapple_client::viewer::{DrawOptions, Method, ScreenOptions};
+use dapple_render::screen_space::ScreenKind;
+use dapple_render::sdao::SideParams;
 
 use crate::args::{LightArgs, ViewArgs, ViewMethod};
 use crate::live::Address;
@@ -83,6 +85,17 @@ fn check(args: &ViewArgs) -> Result<()> {
     }
     if args.fallback.screen_space().is_none() && args.fallback != ViewMethod(Method::None) {
         bail!("--fallback stands in for points: choose a screen-space method (as sao), or none");
+    }
+    if let Some(aside_m) = args.second_camera {
+        if !(aside_m > 0.0 && aside_m.is_finite()) {
+            bail!("--second-camera is {aside_m}, must be above 0 metres");
+        }
+        let shown = [args.method, args.other, args.fallback];
+        if !shown.iter().filter_map(|method| method.screen_space()).any(ScreenKind::takes_second_camera) {
+            let able: Vec<_> = ScreenKind::ALL.iter().filter(|kind| kind.takes_second_camera()).collect();
+            let names: Vec<_> = able.iter().map(|kind| kind.name()).collect();
+            bail!("--second-camera needs a map of what is hidden: choose --method {}", names.join(" or "));
+        }
     }
     if let Some(file) = &args.record_path {
         if !source::is_path_file(&file.to_string_lossy()) {
@@ -170,6 +183,7 @@ fn open(args: &ViewArgs) -> Result<Opening> {
             guard_band: effort.guard_band,
             preset: effort.preset,
             half_resolution: effort.half_resolution,
+            second_camera: args.second_camera.map(|aside_m| SideParams { aside_m, ..SideParams::default() }),
         },
         ..usual
     };

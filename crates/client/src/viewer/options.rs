@@ -5,6 +5,7 @@ use dapple_render::Preset;
 use dapple_render::forward::ForwardError;
 use dapple_render::image::ToneMap;
 use dapple_render::screen_space::ScreenKind;
+use dapple_render::sdao::SideParams;
 use dapple_render::shade::ShadeParams;
 use dapple_stream::Limits;
 
@@ -81,11 +82,20 @@ pub struct ScreenOptions {
     pub preset: Preset,
     /// Whether they look at a quarter of the samples, and the rest follows; `None` (default) as the preset has it.
     pub half_resolution: Option<bool>,
+    /// Where those over stochastic depth have a second camera, which sees what the first one looks along; `None` (default): nowhere. Others take no notice
+    /// ([`ScreenKind::takes_second_camera`]).
+    pub second_camera: Option<SideParams>,
 }
 
 impl Default for ScreenOptions {
     fn default() -> Self {
-        ScreenOptions { radius_m: 0.6, guard_band: 0.1, preset: Preset::default(), half_resolution: None }
+        ScreenOptions {
+            radius_m: 0.6,
+            guard_band: 0.1,
+            preset: Preset::default(),
+            half_resolution: None,
+            second_camera: None,
+        }
     }
 }
 

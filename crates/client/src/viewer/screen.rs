@@ -84,7 +84,7 @@ impl ScreenSpace {
             let view = ScreenView {
                 camera: *camera,
                 size,
-                method: params.with_radius(options.radius_m),
+                method: params.with_radius(options.radius_m).with_second_camera(options.second_camera),
                 guard,
                 half_resolution: options.half_resolution.unwrap_or(half_resolution),
             };

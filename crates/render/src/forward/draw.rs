@@ -31,8 +31,6 @@ pub struct Forward {
     frames: Growing,
     pub(super) lights: Growing,
     frame_group: wgpu::BindGroup,
-    /// Uniforms of [`Forward::draw_geometry`].
-    pub(super) geometry_frames: Growing,
     pub(super) shadows: ShadowAtlas,
     targets: Option<Targets>,
     comparison: Option<Comparison>,
@@ -114,10 +112,9 @@ impl Forward {
             casters: CasterPipelines::new(gpu),
             lookup_groups: vec![None; all.len()],
             needs_group: all.iter().map(|lookup| lookup.layout.is_some()).collect(),
-            frame_group: frame_group(gpu, &frame_layout, &frames, &lights, &shadows),
+            frame_group: frame_group(gpu, &frame_layout, &frames.buffer, &lights, &shadows),
             error_layout: layouts::error(&gpu.device),
             frame_layout,
-            geometry_frames: Growing::new(&gpu.device, "geometry frames", FRAME_STRIDE as u64, uniform),
             frames,
             lights,
             shadows,
@@ -164,7 +161,7 @@ impl Forward {
         let shadows = self.shadows.draw(gpu, encoder, scene, &lights, &self.casters);
         if shadows.is_another_texture {
             self.frame_group =
-                frame_group(gpu, &self.frame_layout, &self.frames, &self.lights, &self.shadows);
+                frame_group(gpu, &self.frame_layout, &self.frames.buffer, &self.lights, &self.shadows);
         }
         self.lights.write(gpu, bytemuck::bytes_of(&*lights.uniform));
         self.write_frames(gpu, inputs, &cameras, lights.count);
@@ -270,7 +267,7 @@ impl Forward {
         }
         if self.frames.write(gpu, &bytes) {
             self.frame_group =
-                frame_group(gpu, &self.frame_layout, &self.frames, &self.lights, &self.shadows);
+                frame_group(gpu, &self.frame_layout, &self.frames.buffer, &self.lights, &self.shadows);
         }
     }
 
@@ -384,7 +381,7 @@ impl Forward {
         pass.set_bind_group(2, &scene.group, &[]);
         let lookup = list.first().and_then(|draw| match draw.key.stage {
             Stage::Picture(lookup) => self.lookup_groups[lookup].as_ref(),
-            Stage::Geometry | Stage::Hidden => None,
+            Stage::Geometry | Stage::Depths | Stage::Hidden => None,
         });
         if let Some(group) = lookup {
             pass.set_bind_group(3, group, &[]);
@@ -475,12 +472,12 @@ fn texture(
 pub(super) fn frame_group(
     gpu: &Gpu,
     layout: &wgpu::BindGroupLayout,
-    frames: &Growing,
+    frames: &wgpu::Buffer,
     lights: &Growing,
     shadows: &ShadowAtlas,
 ) -> wgpu::BindGroup {
     let frame = wgpu::BufferBinding {
-        buffer: &frames.buffer,
+        buffer: frames,
         offset: 0,
         size: std::num::NonZeroU64::new(FRAME_STRIDE as u64),
     };

@@ -4,6 +4,7 @@ use dapple_gpu::{Gpu, wgpu};
 use dapple_scene::{Pose, PosedCamera};
 
 use super::draw::{FRAME_STRIDE, Wants, frame_group};
+use super::layouts;
 use super::pipelines::{DEPTH_FORMAT, NORMAL_FORMAT, Stage};
 use super::view::{ViewCamera, frame_uniform};
 use super::{Forward, ForwardError, FrameInputs, GpuScene, LookupId, Transparency, View};
@@ -19,8 +20,8 @@ pub struct GeometryTarget<'a> {
     /// Columns and rows.
     pub size: (u32, u32),
     /// Gets the unit normals of triangles in the world on the viewer's side, each component as (*n* + 1) / 2, and 1; zero where there is nothing.
-    /// [`GeometryTarget::NORMAL_FORMAT`].
-    pub normals: &'a wgpu::TextureView,
+    /// [`GeometryTarget::NORMAL_FORMAT`]. None where depths are all that is wanted.
+    pub normals: Option<&'a wgpu::TextureView>,
     /// Gets depths, reversed: 0 is the background. [`GeometryTarget::DEPTH_FORMAT`].
     pub depths: &'a wgpu::TextureView,
 }
@@ -34,7 +35,7 @@ impl GeometryTarget<'_> {
 
 impl Forward {
     /// Records depths and normals of views, as [`crate::gbuffer::GBuffer::screen`] has them at one sample a pixel. Materials whose alpha is blended
-    /// are cut out at one half.
+    /// are cut out at one half. A submission may hold any number of these calls, each with its own cameras, and one pose.
     ///
     /// # Errors
     /// A pose of another scene, a camera that cannot project, or a size beyond the device's. Then nothing is recorded.
@@ -60,19 +61,23 @@ impl Forward {
         scene.place(gpu, pose);
         let group = self.geometry_group(gpu, pose, &views);
         for (target, (_, camera)) in targets.iter().zip(&views) {
-            let wants = Wants { stage: Stage::Geometry, blends: false, inspects: false };
+            let stage = if target.normals.is_some() { Stage::Geometry } else { Stage::Depths };
+            let wants = Wants { stage, blends: false, inspects: false };
             let list = self.list(gpu, scene, camera, wants);
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("geometry"),
-                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: target.normals,
+            let normals = target.normals.map(|view| {
+                Some(wgpu::RenderPassColorAttachment {
+                    view,
                     depth_slice: None,
                     resolve_target: None,
                     ops: wgpu::Operations {
                         load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
                         store: wgpu::StoreOp::Store,
                     },
-                })],
+                })
+            });
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("geometry"),
+                color_attachments: normals.as_slice(),
                 depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                     view: target.depths,
                     depth_ops: Some(wgpu::Operations {
@@ -88,9 +93,9 @@ impl Forward {
         Ok(())
     }
 
-    /// Group 0 of passes over views that light does not matter to. What it holds is written once an encoder.
+    /// Group 0 of passes over views that light does not matter to. Each has a small buffer of its own, so that a submission may look from several places.
     pub(super) fn geometry_group(
-        &mut self,
+        &self,
         gpu: &Gpu,
         pose: &Pose,
         views: &[(View<'_>, ViewCamera)],
@@ -109,8 +114,7 @@ impl Forward {
             let uniform = frame_uniform(&inputs, view, camera, 0);
             slot[..size_of_val(&uniform)].copy_from_slice(bytemuck::bytes_of(&uniform));
         }
-        self.geometry_frames.write(gpu, &bytes);
-        // Of small things one is made each time: shadow maps and this buffer come and go.
-        frame_group(gpu, &self.frame_layout, &self.geometry_frames, &self.lights, &self.shadows)
+        let frames = layouts::buffer(&gpu.device, "geometry frames", &bytes, wgpu::BufferUsages::UNIFORM);
+        frame_group(gpu, &self.frame_layout, &frames, &self.lights, &self.shadows)
     }
 }

@@ -86,6 +86,8 @@ pub(super) enum Stage {
     Picture(usize),
     /// Normals and depths ([`super::geometry`]).
     Geometry,
+    /// Depths alone.
+    Depths,
     /// Depths of hidden surfaces in four samples ([`super::hidden`]).
     Hidden,
 }
@@ -148,7 +150,7 @@ impl Pipelines {
                 let lookup = &self.lookups[lookup];
                 (lookup.label, forward_module(lookup), lookup.needs_rest, lookup.layout.as_ref())
             }
-            Stage::Geometry => ("geometry", geometry_module(), false, None),
+            Stage::Geometry | Stage::Depths => ("geometry", geometry_module(), false, None),
             Stage::Hidden => ("hidden", hidden_module(), false, Some(&self.hidden_layout)),
         };
         let layouts: Vec<_> = self.groups.iter().chain(own).map(Some).collect();
@@ -184,7 +186,7 @@ impl Pipelines {
         let stage = &self.stages[&key.stage];
         let (format, samples) = match key.stage {
             Stage::Picture(_) => (self.format, self.samples),
-            Stage::Geometry => (NORMAL_FORMAT, 1),
+            Stage::Geometry | Stage::Depths => (NORMAL_FORMAT, 1),
             Stage::Hidden => (NORMAL_FORMAT, 4),
         };
         let target = [Some(wgpu::ColorTargetState {
@@ -199,6 +201,9 @@ impl Pipelines {
             let own = [rest, ("BLENDS", flag(key.blends)), ("INSPECTS", flag(key.inspects))];
             fragment_constants.extend(own);
         }
+        // Whose depths are all there is.
+        let has_no_target = matches!(key.stage, Stage::Depths | Stage::Hidden);
+        let entry_point = if key.stage == Stage::Depths { "depth_fragment" } else { "fragment" };
         let options = |constants| wgpu::PipelineCompilationOptions { constants, ..Default::default() };
         gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some("forward"),
@@ -218,10 +223,9 @@ impl Pipelines {
             multisample: multisample(samples),
             fragment: Some(wgpu::FragmentState {
                 module: &stage.module,
-                entry_point: Some("fragment"),
+                entry_point: Some(entry_point),
                 compilation_options: options(&fragment_constants),
-                // Of hidden surfaces depths are all there is.
-                targets: if key.stage == Stage::Hidden { &[] } else { &target },
+                targets: if has_no_target { &[] } else { &target },
             }),
             multiview_mask: None,
             cache: None,

@@ -5,7 +5,10 @@ use crate::gbuffer::Screen;
 use crate::gtao::{self, GtaoParams};
 use crate::hbao::{self, HbaoParams, Horizon};
 use crate::sao::{self, SaoParams};
-use crate::sdao::{Hidden, Looks, Lookup, MapParams, StochasticMap};
+use crate::sdao::{
+    Hidden, Looks, Lookup, MapParams, SideParams, SideView, StochasticMap, check_horizon_of_two,
+    estimate_ssao_of_two, estimate_visibility_of_two,
+};
 use crate::ssao::{self, SsaoParams};
 use crate::{AfterPass, Chosen, Preset, RenderError};
 
@@ -59,6 +62,11 @@ impl ScreenKind {
             ScreenKind::SdHbao => "sd-hbao",
             ScreenKind::SdHbaoPlus => "sd-hbao-plus",
         }
+    }
+
+    /// Whether a second camera can be added: where hidden surfaces are looked at, without a tangent.
+    pub const fn takes_second_camera(self) -> bool {
+        matches!(self, ScreenKind::SdSsao | ScreenKind::SdHbaoPlus)
     }
 
     /// With its defaults.
@@ -121,11 +129,18 @@ pub struct StochasticParams {
     pub looks: Looks,
     /// What occlusion by hidden surfaces is multiplied by, 0 … 16; default 1.
     pub compensation: f32,
+    /// Where a second camera stands that has a map of its own (Alg. 3); default none. Of SSAO and HBAO+ alone.
+    pub second: Option<SideParams>,
 }
 
 impl Default for StochasticParams {
     fn default() -> Self {
-        StochasticParams { map: MapParams::default(), looks: Looks::default(), compensation: 1.0 }
+        StochasticParams {
+            map: MapParams::default(),
+            looks: Looks::default(),
+            compensation: 1.0,
+            second: None,
+        }
     }
 }
 
@@ -140,7 +155,7 @@ impl StochasticParams {
             let found = self.compensation.into();
             return Err(RenderError::Parameter { name: "sdao: compensation", found, range: "0 to 16" });
         }
-        Ok(())
+        self.second.map_or(Ok(()), |side| side.check())
     }
 }
 
@@ -180,6 +195,26 @@ impl ScreenMethod {
         }
     }
 
+    /// The same with a second camera, or without one; as it is where there can be none ([`ScreenKind::takes_second_camera`]).
+    pub fn with_second_camera(self, second: Option<SideParams>) -> ScreenMethod {
+        match self {
+            ScreenMethod::Stochastic(layered, stochastic) if self.kind().takes_second_camera() => {
+                ScreenMethod::Stochastic(layered, StochasticParams { second, ..stochastic })
+            }
+            other => other,
+        }
+    }
+
+    /// Where its second camera stands, if it has one, at a resolution of the first one's picture: as coarse as that.
+    pub fn second_camera(&self, half_resolution: bool) -> Option<SideParams> {
+        match self {
+            ScreenMethod::Stochastic(_, StochasticParams { second, .. }) => {
+                second.map(|side| if half_resolution { side.half() } else { side })
+            }
+            _ => None,
+        }
+    }
+
     /// Whether every parameter is in its range.
     ///
     /// # Errors
@@ -195,6 +230,10 @@ impl ScreenMethod {
                 stochastic.check()?;
                 match layered {
                     Layered::Ssao(params) => params.check(),
+                    Layered::Hbao(params) if stochastic.second.is_some() => {
+                        params.check()?;
+                        check_horizon_of_two(params)
+                    }
                     Layered::Hbao(params) => params.check(),
                 }
             }
@@ -218,7 +257,7 @@ impl ScreenMethod {
     }
 
     /// Visibility 0 … 1 of each sample of a picture, row-major from the top, 1 for the background: the method's own `estimate_visibility`. A stochastic method is given
-    /// its map; the others need none.
+    /// its map, and what its second camera sees; the others need none.
     ///
     /// # Errors
     /// A parameter out of its range, or a map of another picture, or none where one is needed.
@@ -226,35 +265,42 @@ impl ScreenMethod {
         &self,
         screen: &Screen,
         map: Option<&StochasticMap>,
+        side: Option<&SideView>,
     ) -> Result<Vec<f32>, RenderError> {
         let lookup = match self {
-            ScreenMethod::Stochastic(_, StochasticParams { looks, compensation, .. }) => {
+            ScreenMethod::Stochastic(_, StochasticParams { looks, compensation, second, .. }) => {
                 RenderError::check_length("stochastic maps", usize::from(map.is_some()), 1)?;
+                let cameras = usize::from(second.is_some());
+                RenderError::check_length("second cameras", usize::from(side.is_some()), cameras)?;
                 let hidden = map.map_or(Hidden::Nothing, Hidden::Stochastic);
                 Lookup { hidden, looks: *looks, compensation: *compensation }
             }
             _ => Lookup::default(),
         };
-        self.estimate_by_passes(screen, &lookup, &mut |_| ())
+        self.estimate_by_passes(screen, &lookup, side, &mut |_| ())
     }
 
-    /// The same with what is known of hidden surfaces, which AlchemyAO, SAO and GTAO do not look at; `after` is told the name of each pass.
+    /// The same with what is known of hidden surfaces, which AlchemyAO, SAO and GTAO do not look at, and of what a second camera sees, which HBAO does not take;
+    /// `after` is told the name of each pass.
     ///
     /// # Errors
-    /// A parameter out of its range, or hidden surfaces of another picture.
+    /// A parameter out of its range, or hidden surfaces of another picture, or a second camera for HBAO.
     pub fn estimate_by_passes(
         &self,
         screen: &Screen,
         lookup: &Lookup<'_>,
+        side: Option<&SideView>,
         after: AfterPass<'_>,
     ) -> Result<Vec<f32>, RenderError> {
         match self {
-            ScreenMethod::Ssao(params) | ScreenMethod::Stochastic(Layered::Ssao(params), _) => {
-                ssao::estimate_by_passes(screen, params, lookup, after)
-            }
-            ScreenMethod::Hbao(params) | ScreenMethod::Stochastic(Layered::Hbao(params), _) => {
-                hbao::estimate_by_passes(screen, params, lookup, after)
-            }
+            ScreenMethod::Ssao(params) | ScreenMethod::Stochastic(Layered::Ssao(params), _) => match side {
+                Some(side) => estimate_ssao_of_two(screen, params, lookup, side, after),
+                None => ssao::estimate_by_passes(screen, params, lookup, after),
+            },
+            ScreenMethod::Hbao(params) | ScreenMethod::Stochastic(Layered::Hbao(params), _) => match side {
+                Some(side) => estimate_visibility_of_two(screen, params, lookup, side, after),
+                None => hbao::estimate_by_passes(screen, params, lookup, after),
+            },
             ScreenMethod::Alchemy(params) => alchemy::estimate_by_passes(screen, params, after),
             ScreenMethod::Sao(params) => sao::estimate_by_passes(screen, params, after),
             ScreenMethod::Gtao(params) => gtao::estimate_by_passes(screen, params, after),

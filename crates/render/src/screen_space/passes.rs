@@ -1,37 +1,30 @@
 //! A method's passes on the card, and what they write.
 
-use std::collections::BTreeMap;
-
-use dapple_gpu::{Gpu, shader_module, wgpu};
+use dapple_gpu::{Gpu, wgpu};
 use dapple_scene::{Pose, PosedCamera};
 
+use super::bindings::{Kit, Resource, group, lookup_layout};
+use super::cameras::{Cameras, SideCamera};
 use super::method::ScreenMethod;
-use super::plan::{Image, Pass, Shader, hidden_layers, level_size, levels, passes, seen_size};
-use super::textures::{array_view, can_draw_maps, hidden_texture, map_view, texture};
-use super::uniforms::ScreenUniform;
+use super::plan::{Image, hidden_layers, padded_size, seen_size};
+use super::steps::Plan;
+use super::textures::can_draw_maps;
+use crate::RenderError;
 use crate::forward::{
     Forward, ForwardError, GeometryTarget, GpuScene, HIDDEN_SAMPLES, HiddenChoice, HiddenTarget, Lookup,
     LookupId,
 };
 use crate::gbuffer::GuardBand;
+use crate::sdao::side_from_main;
 
 /// One screen-space method on a card: draws depths and normals of a view, runs the method over them, and lets the forward pass look the result up. Keeps what it makes
 /// from frame to frame.
 #[derive(Debug)]
 pub struct ScreenPasses {
     lookup: LookupId,
-    /// Of the picture, of a pass, of the one that reads the stochastic map, and of the one that reads depths.
-    layouts: [wgpu::BindGroupLayout; 4],
-    lookup_layout: wgpu::BindGroupLayout,
-    pipelines: BTreeMap<(Shader, Image), wgpu::RenderPipeline>,
-    /// What passes bind that write the distances themselves.
-    blank: wgpu::TextureView,
-    /// What methods bind that know nothing of hidden surfaces.
-    nothing_hidden: wgpu::TextureView,
-    nearest: wgpu::Sampler,
+    kit: Kit,
+    cameras: Cameras,
     choice: Option<HiddenChoice>,
-    /// Of the whole picture, and of half its resolution.
-    screens: [wgpu::Buffer; 2],
     plan: Option<Plan>,
 }
 
@@ -51,40 +44,25 @@ pub struct ScreenView {
 }
 
 impl ScreenView {
-    fn guarded(&self) -> [u32; 2] {
-        self.guard.size([self.size.0, self.size.1])
+    /// Columns and rows with the guard band.
+    pub(super) fn guarded(&self) -> (u32, u32) {
+        self.guard.size([self.size.0, self.size.1]).into()
     }
-}
 
-impl Plan {
-    fn serves(&self, view: &ScreenView) -> bool {
-        ScreenView { camera: self.view.camera, ..*view } == self.view
+    /// Columns and rows of the second camera's picture, if there is one.
+    pub(super) fn side_size(&self) -> Option<(u32, u32)> {
+        let side = self.method.second_camera(self.half_resolution)?;
+        Some(side.size(self.guarded().into()).into())
     }
-}
 
-/// All that one method needs for pictures of one size.
-#[derive(Debug)]
-struct Plan {
-    /// What it was made for; its camera is the first's.
-    view: ScreenView,
-    normals: wgpu::TextureView,
-    depths: wgpu::TextureView,
-    /// Depths of the stochastic map, four samples each.
-    maps: Vec<wgpu::TextureView>,
-    steps: Vec<Step>,
-    picture: wgpu::Texture,
-    #[cfg(test)]
-    hidden: wgpu::Texture,
-}
-
-#[derive(Debug)]
-struct Step {
-    label: &'static str,
-    pipeline: wgpu::RenderPipeline,
-    groups: [wgpu::BindGroup; 2],
-    target: wgpu::TextureView,
-    /// Columns and rows that are written.
-    size: (u32, u32),
+    /// The second camera beside one with the guard band.
+    fn side_camera(&self, main: &PosedCamera) -> Result<Option<SideCamera>, RenderError> {
+        let Some(side) = self.method.second_camera(self.half_resolution) else { return Ok(None) };
+        let (columns, rows) = self.guarded();
+        let camera = side.camera(main, f64::from(columns) / f64::from(rows))?;
+        let size = side.size([columns, rows]).into();
+        Ok(Some(SideCamera { camera, size, side_from_main: side_from_main(main, &camera) }))
+    }
 }
 
 impl ScreenPasses {
@@ -112,32 +90,7 @@ impl ScreenPasses {
             let reason = "this device cannot draw into textures of floats, which screen-space methods need";
             return Err(ForwardError::Frame { reason });
         }
-        let device = &gpu.device;
-        let layouts = [
-            layout(device, "screen", &[(0, UNIFORM), (1, TEXTURE), (2, TEXTURE)]),
-            layout(device, "screen pass", &[(0, UNIFORM), (1, TEXTURE), (2, TEXTURES)]),
-            layout(device, "stochastic map", &[(0, UNIFORM), (3, SAMPLED_DEPTHS)]),
-            layout(device, "depths", &[(0, UNIFORM), (1, TEXTURE), (4, NEAREST)]),
-        ];
-        Ok(ScreenPasses {
-            lookup,
-            lookup_layout: lookup_layout(device),
-            pipelines: BTreeMap::new(),
-            blank: texture(gpu, Image::Distances(0).format(), (1, 1), 1).create_view(&Default::default()),
-            nothing_hidden: array_view(&hidden_texture(gpu, (1, 1), 0)),
-            nearest: device.create_sampler(&wgpu::SamplerDescriptor::default()),
-            choice: None,
-            screens: [(); 2].map(|()| {
-                device.create_buffer(&wgpu::BufferDescriptor {
-                    label: Some("screen"),
-                    size: size_of::<ScreenUniform>() as u64,
-                    usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                    mapped_at_creation: false,
-                })
-            }),
-            layouts,
-            plan: None,
-        })
+        Ok(ScreenPasses { lookup, kit: Kit::new(gpu), cameras: Cameras::new(gpu), choice: None, plan: None })
     }
 
     /// Lets go of the textures of the last picture.
@@ -159,8 +112,8 @@ impl ScreenPasses {
     }
 
     /// Records the method's passes for a picture and gives `forward` the result for its look-up. The view's camera and size, and the pose, must be those that the
-    /// picture is then drawn with. The geometry is drawn anew, with the guard band. Once a submission, unless camera and size are the same: what a camera's passes read is
-    /// written before any of them runs.
+    /// picture is then drawn with. The geometry is drawn anew, with the guard band. A submission may hold any number of these calls, from any cameras, of one pose; each
+    /// overwrites what the last one found.
     ///
     /// # Errors
     /// A parameter out of its range, or what [`Forward::draw_geometry`] refuses. Then nothing is recorded.
@@ -203,13 +156,15 @@ impl ScreenPasses {
         }
         let view = &view;
         let largest = gpu.device.limits().max_texture_dimension_2d;
-        let [width, height] = view.guarded();
-        let padded = padded_size(&view.method, seen_size((width, height), view.half_resolution));
-        let widest = width.max(height).max(padded.0).max(padded.1);
+        let size = view.guarded();
+        let padded = padded_size(&view.method, seen_size(size, view.half_resolution));
+        let widest = size.0.max(size.1).max(padded.0).max(padded.1);
         if view.size.0 == 0 || view.size.1 == 0 || widest > largest {
             let reason = "the picture has no pixels, or with its guard band more than the device allows: make it smaller";
             return Err(ForwardError::Frame { reason });
         }
+        let camera = view.guard.camera(&view.camera, view.size.1);
+        let side = view.side_camera(&camera)?;
         let map = match &view.method {
             ScreenMethod::Stochastic(_, stochastic) => Some(&stochastic.map),
             _ => None,
@@ -220,27 +175,34 @@ impl ScreenPasses {
         }
         let is_current = self.plan.as_ref().is_some_and(|plan| plan.serves(view));
         if !is_current {
-            self.plan = Some(self.make_plan(gpu, view));
+            self.plan = Some(Plan::new(gpu, &mut self.kit, &self.cameras, view));
         }
         let Some(plan) = &self.plan else { return Ok(()) };
-        let camera = view.guard.camera(&view.camera, view.size.1);
-        let size = (width, height);
-        let target = GeometryTarget { camera, size, normals: &plan.normals, depths: &plan.depths };
-        forward.draw_geometry(gpu, encoder, scene, pose, &[target])?;
-        for (depths, index) in plan.maps.iter().zip(0..) {
-            let Some(choice) = &self.choice else { break };
-            let first_sample = index * HIDDEN_SAMPLES;
-            let target = HiddenTarget { camera, size, first_depths: &plan.depths, depths, first_sample };
-            forward.draw_hidden(gpu, encoder, scene, pose, choice, &target)?;
+        let target = GeometryTarget { camera, size, normals: Some(&plan.normals), depths: &plan.depths };
+        let mut targets = vec![target];
+        if let (Some(side), Some(depths)) = (&side, &plan.side_depths) {
+            targets.push(GeometryTarget { camera: side.camera, size: side.size, normals: None, depths });
         }
-        let full = ScreenUniform::new(&camera, size);
-        for (buffer, uniform) in self.screens.iter().zip([full, full.half()]) {
-            gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&uniform));
+        forward.draw_geometry(gpu, encoder, scene, pose, &targets)?;
+        let mut maps = vec![(camera, size, &plan.depths, &plan.maps)];
+        if let Some(side) = &side {
+            // Where no first surface is left out none is read.
+            let first_depths = plan.side_depths.as_ref().unwrap_or(&self.kit.blank);
+            maps.push((side.camera, side.size, first_depths, &plan.side_maps));
         }
+        for (camera, size, first_depths, layers) in maps {
+            for (depths, index) in layers.iter().zip(0..) {
+                let Some(choice) = &self.choice else { break };
+                let first_sample = index * HIDDEN_SAMPLES;
+                let target = HiddenTarget { camera, size, first_depths, depths, first_sample };
+                forward.draw_hidden(gpu, encoder, scene, pose, choice, &target)?;
+            }
+        }
+        self.cameras.record(gpu, encoder, &camera, size, side.as_ref());
         let view = plan.picture.create_view(&Default::default());
         forward.bind_lookup(
             self.lookup,
-            group(&gpu.device, &self.lookup_layout, &[(0, Resource::Texture(&view))]),
+            group(&gpu.device, &self.kit.lookup_layout, &[(0, Resource::Texture(&view))]),
         );
         Ok(())
     }
@@ -279,252 +241,9 @@ impl ScreenPasses {
         self.plan.as_ref().map(|plan| &plan.picture)
     }
 
-    /// Distances of the last picture's hidden surfaces, metres: four a texel and layer, 1e30 where there is none.
+    /// Distances of the last picture's hidden surfaces, metres, and of the second camera's: four a texel and layer, 1e30 where there is none.
     #[cfg(test)]
-    pub(super) fn hidden(&self) -> Option<&wgpu::Texture> {
+    pub(super) fn hidden(&self) -> Option<&[wgpu::Texture; 2]> {
         self.plan.as_ref().map(|plan| &plan.hidden)
     }
-
-    fn make_plan(&mut self, gpu: &Gpu, view: &ScreenView) -> Plan {
-        let [width, height] = view.guarded();
-        let full = (width, height);
-        let seen = seen_size(full, view.half_resolution);
-        let level_count = levels(&view.method, seen) + 1;
-        let padded = padded_size(&view.method, seen);
-        let distances = texture(gpu, Image::Distances(0).format(), padded, level_count);
-        let picture = texture(gpu, Image::Picture.format(), view.size, 1);
-        let size_of = |image| match image {
-            Image::Picture => view.size,
-            Image::Depths | Image::Normals | Image::FullDistances => full,
-            Image::Distances(level) => level_size(seen, level),
-            Image::Map(_) => full,
-            Image::HalfNormals | Image::Value(_) | Image::Packed(_) | Image::Hidden(_) => seen,
-        };
-        let passes = passes(&view.method, full, view.guard.pixels(), view.half_resolution);
-        let mut views: BTreeMap<Image, wgpu::TextureView> = BTreeMap::new();
-        views.insert(Image::Picture, picture.create_view(&Default::default()));
-        for level in 0..level_count {
-            let descriptor = wgpu::TextureViewDescriptor {
-                base_mip_level: level,
-                mip_level_count: Some(1),
-                ..Default::default()
-            };
-            views.insert(Image::Distances(level), distances.create_view(&descriptor));
-        }
-        let layers = hidden_layers(&view.method);
-        let hidden = hidden_texture(gpu, if layers > 0 { seen } else { (1, 1) }, layers);
-        let all_hidden = array_view(&hidden);
-        for layer in 0..layers {
-            let descriptor = wgpu::TextureViewDescriptor {
-                dimension: Some(wgpu::TextureViewDimension::D2),
-                base_array_layer: layer,
-                array_layer_count: Some(1),
-                ..Default::default()
-            };
-            views.insert(Image::Hidden(layer), hidden.create_view(&descriptor));
-            views.insert(Image::Map(layer), map_view(gpu, full));
-        }
-        let named = passes.iter().flat_map(|pass| pass.reads.into_iter().chain([pass.writes]));
-        for image in named.chain([Image::Normals]) {
-            let plain = || texture(gpu, image.format(), size_of(image), 1).create_view(&Default::default());
-            views.entry(image).or_insert_with(plain);
-        }
-        let all_distances = distances.create_view(&Default::default());
-        let mut steps = Vec::new();
-        for Pass { shader, reads, writes, params } in passes {
-            // The picture is placed among all samples.
-            let is_half = view.half_resolution && writes != Image::Picture;
-            let distances = match (shader, view.half_resolution) {
-                // What they write themselves cannot be read.
-                (Shader::Distance | Shader::Minify | Shader::Halve | Shader::Resolve, _) => &self.blank,
-                (Shader::Place, true) => &views[&Image::FullDistances],
-                _ => &all_distances,
-            };
-            let normals = match shader {
-                Shader::Distance | Shader::Minify | Shader::Halve | Shader::Resolve => &self.blank,
-                _ if is_half => &views[&Image::HalfNormals],
-                _ => &views[&Image::Normals],
-            };
-            let is_looking = matches!(shader, Shader::Ssao | Shader::Hbao) && layers > 0;
-            let uniform = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(shader.label()),
-                size: params.len() as u64,
-                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            });
-            gpu.queue.write_buffer(&uniform, 0, &params);
-            let before = reads.map_or(&self.blank, |image| &views[&image]);
-            let screen = &self.screens[usize::from(is_half)];
-            let own = [
-                (0, Resource::Uniform(screen)),
-                (1, Resource::Texture(distances)),
-                (2, Resource::Texture(normals)),
-            ];
-            let passed = match shader {
-                Shader::Resolve => vec![(0, Resource::Uniform(&uniform)), (3, Resource::Texture(before))],
-                Shader::Distance => vec![
-                    (0, Resource::Uniform(&uniform)),
-                    (1, Resource::Texture(before)),
-                    (4, Resource::Sampler(&self.nearest)),
-                ],
-                _ => vec![
-                    (0, Resource::Uniform(&uniform)),
-                    (1, Resource::Texture(before)),
-                    (2, Resource::Texture(if is_looking { &all_hidden } else { &self.nothing_hidden })),
-                ],
-            };
-            let groups = [
-                group(&gpu.device, &self.layouts[0], &own),
-                group(&gpu.device, self.pass_layout(shader), &passed),
-            ];
-            steps.push(Step {
-                label: shader.label(),
-                target: views[&writes].clone(),
-                pipeline: self.pipeline(gpu, shader, writes),
-                groups,
-                size: size_of(writes),
-            });
-        }
-        let [normals, depths] = [Image::Normals, Image::Depths].map(|image| views[&image].clone());
-        let maps = (0..layers).map(|layer| views[&Image::Map(layer)].clone()).collect();
-        Plan {
-            view: *view,
-            normals,
-            depths,
-            maps,
-            steps,
-            picture,
-            #[cfg(test)]
-            hidden,
-        }
-    }
-
-    /// Layout of a pass's own group.
-    fn pass_layout(&self, shader: Shader) -> &wgpu::BindGroupLayout {
-        match shader {
-            Shader::Resolve => &self.layouts[2],
-            Shader::Distance => &self.layouts[3],
-            _ => &self.layouts[1],
-        }
-    }
-
-    fn pipeline(&mut self, gpu: &Gpu, shader: Shader, writes: Image) -> wgpu::RenderPipeline {
-        // One for each format.
-        let key = (
-            shader,
-            match writes {
-                Image::Distances(_) => Image::Distances(0),
-                Image::Value(_) => Image::Value(0),
-                Image::Packed(_) => Image::Packed(0),
-                other => other,
-            },
-        );
-        let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("screen"),
-            bind_group_layouts: &[Some(&self.layouts[0]), Some(self.pass_layout(shader))],
-            immediate_size: 0,
-        });
-        let made = self.pipelines.entry(key).or_insert_with(|| {
-            let (wgsl, entry) = shader.module();
-            let module = shader_module(&gpu.device, shader.label(), &wgsl);
-            gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some(shader.label()),
-                layout: Some(&layout),
-                vertex: wgpu::VertexState {
-                    module: &module,
-                    entry_point: Some("screen_vertex"),
-                    compilation_options: Default::default(),
-                    buffers: &[],
-                },
-                primitive: wgpu::PrimitiveState::default(),
-                depth_stencil: None,
-                multisample: wgpu::MultisampleState::default(),
-                fragment: Some(wgpu::FragmentState {
-                    module: &module,
-                    entry_point: Some(entry),
-                    compilation_options: wgpu::PipelineCompilationOptions {
-                        constants: &shader.constants(),
-                        ..Default::default()
-                    },
-                    targets: &[Some(key.1.format().into())],
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
-        });
-        made.clone()
-    }
-}
-
-const UNIFORM: wgpu::BindingType = wgpu::BindingType::Buffer {
-    ty: wgpu::BufferBindingType::Uniform,
-    has_dynamic_offset: false,
-    min_binding_size: None,
-};
-const TEXTURE: wgpu::BindingType = wgpu::BindingType::Texture {
-    sample_type: wgpu::TextureSampleType::Float { filterable: false },
-    view_dimension: wgpu::TextureViewDimension::D2,
-    multisampled: false,
-};
-
-const NEAREST: wgpu::BindingType = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering);
-const TEXTURES: wgpu::BindingType = wgpu::BindingType::Texture {
-    sample_type: wgpu::TextureSampleType::Float { filterable: false },
-    view_dimension: wgpu::TextureViewDimension::D2Array,
-    multisampled: false,
-};
-const SAMPLED_DEPTHS: wgpu::BindingType = wgpu::BindingType::Texture {
-    sample_type: wgpu::TextureSampleType::Depth,
-    view_dimension: wgpu::TextureViewDimension::D2,
-    multisampled: true,
-};
-
-fn layout(device: &wgpu::Device, label: &str, types: &[(u32, wgpu::BindingType)]) -> wgpu::BindGroupLayout {
-    let entries: Vec<_> = types
-        .iter()
-        .map(|&(binding, ty)| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::FRAGMENT,
-            ty,
-            count: None,
-        })
-        .collect();
-    device
-        .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
-}
-
-fn lookup_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    layout(device, "screen space", &[(0, TEXTURE)])
-}
-
-enum Resource<'a> {
-    Uniform(&'a wgpu::Buffer),
-    Sampler(&'a wgpu::Sampler),
-    Texture(&'a wgpu::TextureView),
-}
-
-fn group(
-    device: &wgpu::Device,
-    layout: &wgpu::BindGroupLayout,
-    resources: &[(u32, Resource<'_>)],
-) -> wgpu::BindGroup {
-    let entries: Vec<_> = resources
-        .iter()
-        .map(|(binding, resource)| wgpu::BindGroupEntry {
-            binding: *binding,
-            resource: match resource {
-                Resource::Uniform(buffer) => buffer.as_entire_binding(),
-                Resource::Sampler(sampler) => wgpu::BindingResource::Sampler(sampler),
-                Resource::Texture(view) => wgpu::BindingResource::TextureView(view),
-            },
-        })
-        .collect();
-    device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout, entries: &entries })
-}
-
-/// Of the texture of distances. The twin's levels are rounded up, a card's down: its first one is larger then, and passes write parts alone.
-fn padded_size(method: &ScreenMethod, seen: (u32, u32)) -> (u32, u32) {
-    let whole = 1u32 << levels(method, seen);
-    let padded = |side: u32| side.checked_next_multiple_of(whole).unwrap_or(u32::MAX);
-    (padded(seen.0), padded(seen.1))
 }

@@ -17,6 +17,9 @@ use crate::ssao::SsaoParams;
 pub(super) const SCREEN_WGSL: &str = include_str!("wgsl/screen.wgsl");
 const NOISE_WGSL: &str = include_str!("wgsl/noise.wgsl");
 const HIDDEN_WGSL: &str = include_str!("../sdao/hidden.wgsl");
+const BESIDE_WGSL: &str = include_str!("../sdao/beside.wgsl");
+const HEIGHT_WGSL: &str = include_str!("../hbao/height.wgsl");
+const PLACES_WGSL: &str = include_str!("../ssao/places.wgsl");
 const OBSCURANCE_WGSL: &str = include_str!("../obscurance.wgsl");
 
 /// One fragment stage over the whole picture.
@@ -28,6 +31,8 @@ pub(super) enum Shader {
     Resolve,
     Minify,
     Ssao,
+    /// From the second camera.
+    SsaoBeside,
     SsaoBlur,
     Alchemy,
     /// With the rotated grid, or another filter.
@@ -36,6 +41,8 @@ pub(super) enum Shader {
     },
     Reconstruct,
     Hbao,
+    /// From the second camera.
+    HbaoBeside,
     Gtao,
     Bilateral,
     Place,
@@ -43,18 +50,20 @@ pub(super) enum Shader {
 
 impl Shader {
     #[cfg(test)]
-    pub(super) const ALL: [Shader; 14] = [
+    pub(super) const ALL: [Shader; 16] = [
         Shader::Distance,
         Shader::Halve,
         Shader::Resolve,
         Shader::Minify,
         Shader::Ssao,
+        Shader::SsaoBeside,
         Shader::SsaoBlur,
         Shader::Alchemy,
         Shader::Sao { rotated: true },
         Shader::Sao { rotated: false },
         Shader::Reconstruct,
         Shader::Hbao,
+        Shader::HbaoBeside,
         Shader::Gtao,
         Shader::Bilateral,
         Shader::Place,
@@ -68,6 +77,7 @@ impl Shader {
             Shader::Resolve => "map",
             Shader::Minify => "levels",
             Shader::Ssao | Shader::Alchemy | Shader::Sao { .. } | Shader::Hbao | Shader::Gtao => "samples",
+            Shader::SsaoBeside | Shader::HbaoBeside => "second samples",
             Shader::SsaoBlur | Shader::Bilateral | Shader::Reconstruct => "blur",
             Shader::Place => "place",
         }
@@ -80,7 +90,11 @@ impl Shader {
             Shader::Halve => (&[include_str!("wgsl/halve.wgsl")], "halve_fragment"),
             Shader::Minify => (&[include_str!("../sao/minify.wgsl")], "minify_fragment"),
             Shader::Resolve => (&[include_str!("../sdao/resolve.wgsl")], "resolve_fragment"),
-            Shader::Ssao => (&[HIDDEN_WGSL, include_str!("../ssao/ssao.wgsl")], "ssao_fragment"),
+            Shader::Ssao => (&[HIDDEN_WGSL, PLACES_WGSL, include_str!("../ssao/ssao.wgsl")], "ssao_fragment"),
+            Shader::SsaoBeside => (
+                &[HIDDEN_WGSL, PLACES_WGSL, BESIDE_WGSL, include_str!("../ssao/beside.wgsl")],
+                "ssao_beside_fragment",
+            ),
             Shader::SsaoBlur => (&[include_str!("../ssao/blur.wgsl")], "blur_fragment"),
             Shader::Alchemy => {
                 (&[NOISE_WGSL, OBSCURANCE_WGSL, include_str!("../alchemy/alchemy.wgsl")], "alchemy_fragment")
@@ -89,7 +103,13 @@ impl Shader {
                 (&[NOISE_WGSL, OBSCURANCE_WGSL, include_str!("../sao/sample.wgsl")], "sao_fragment")
             }
             Shader::Reconstruct => (&[include_str!("../sao/reconstruct.wgsl")], "reconstruct_fragment"),
-            Shader::Hbao => (&[NOISE_WGSL, HIDDEN_WGSL, include_str!("../hbao/hbao.wgsl")], "hbao_fragment"),
+            Shader::Hbao => {
+                (&[NOISE_WGSL, HIDDEN_WGSL, HEIGHT_WGSL, include_str!("../hbao/hbao.wgsl")], "hbao_fragment")
+            }
+            Shader::HbaoBeside => (
+                &[NOISE_WGSL, HIDDEN_WGSL, HEIGHT_WGSL, BESIDE_WGSL, include_str!("../hbao/beside.wgsl")],
+                "hbao_beside_fragment",
+            ),
             Shader::Gtao => (&[NOISE_WGSL, include_str!("../gtao/gtao.wgsl")], "gtao_fragment"),
             Shader::Bilateral => (&[include_str!("wgsl/bilateral.wgsl")], "bilateral_fragment"),
             Shader::Place => (&[include_str!("wgsl/place.wgsl")], "place_fragment"),
@@ -123,6 +143,14 @@ pub(super) enum Image {
     Map(u32),
     /// The same as distances.
     Hidden(u32),
+    /// Depths of what the second camera sees.
+    SideDepths,
+    /// The same as distances.
+    SideDistances,
+    /// Four samples of the second camera's map, as depths.
+    SideMap(u32),
+    /// The same as distances.
+    SideHidden(u32),
     /// One value a sample, in turns.
     Value(usize),
     /// Value and distance in bytes, in turns.
@@ -134,15 +162,29 @@ pub(super) enum Image {
 impl Image {
     pub(super) fn format(self) -> wgpu::TextureFormat {
         match self {
-            Image::Depths | Image::Map(_) => GeometryTarget::DEPTH_FORMAT,
-            Image::Hidden(_) => wgpu::TextureFormat::Rgba32Float,
-            Image::Distances(_) | Image::FullDistances => wgpu::TextureFormat::R32Float,
+            Image::Depths | Image::SideDepths | Image::Map(_) | Image::SideMap(_) => {
+                GeometryTarget::DEPTH_FORMAT
+            }
+            Image::Hidden(_) | Image::SideHidden(_) => wgpu::TextureFormat::Rgba32Float,
+            Image::Distances(_) | Image::FullDistances | Image::SideDistances => {
+                wgpu::TextureFormat::R32Float
+            }
             Image::Normals | Image::HalfNormals => GeometryTarget::NORMAL_FORMAT,
             Image::Value(_) => wgpu::TextureFormat::R16Float,
             Image::Packed(_) => wgpu::TextureFormat::Rgba8Unorm,
             Image::Picture => wgpu::TextureFormat::Rg16Float,
         }
     }
+}
+
+/// The picture whose lens and samples a pass sees.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Sight {
+    Whole,
+    /// A quarter of the samples.
+    Half,
+    /// The second camera's.
+    Beside,
 }
 
 /// One pass: what it reads beside distances and normals, what it writes, and its parameters' bytes.
@@ -152,6 +194,28 @@ pub(super) struct Pass {
     pub(super) reads: Option<Image>,
     pub(super) writes: Image,
     pub(super) params: Vec<u8>,
+}
+
+impl Pass {
+    /// For messages and timings.
+    pub(super) fn label(&self) -> &'static str {
+        match self.writes {
+            Image::SideDistances | Image::SideHidden(_) => "second map",
+            _ => self.shader.label(),
+        }
+    }
+
+    /// Of a method that sees half the resolution, or all of it.
+    pub(super) fn sight(&self, half_resolution: bool) -> Sight {
+        match (self.shader, self.writes) {
+            (Shader::SsaoBeside | Shader::HbaoBeside, _) => Sight::Beside,
+            (_, Image::SideDistances | Image::SideHidden(_)) => Sight::Beside,
+            // The picture is placed among all samples.
+            (_, Image::Picture) => Sight::Whole,
+            _ if half_resolution => Sight::Half,
+            _ => Sight::Whole,
+        }
+    }
 }
 
 fn pass<P: bytemuck::Pod>(shader: Shader, reads: Option<Image>, writes: Image, params: P) -> Pass {
@@ -170,6 +234,13 @@ pub(super) fn levels(method: &ScreenMethod, size: (u32, u32)) -> u32 {
     params.levels.min(longest.next_power_of_two().ilog2())
 }
 
+/// Of the texture of distances. The twin's levels are rounded up, a card's down: its first one is larger then, and passes write parts alone.
+pub(super) fn padded_size(method: &ScreenMethod, seen: (u32, u32)) -> (u32, u32) {
+    let whole = 1u32 << levels(method, seen);
+    let padded = |side: u32| side.checked_next_multiple_of(whole).unwrap_or(u32::MAX);
+    (padded(seen.0), padded(seen.1))
+}
+
 /// Textures of four samples that a method's stochastic map takes.
 pub(super) fn hidden_layers(method: &ScreenMethod) -> u32 {
     match method {
@@ -183,12 +254,14 @@ pub(super) fn seen_size(size: (u32, u32), half_resolution: bool) -> (u32, u32) {
     if half_resolution { level_size(size, 1) } else { size }
 }
 
-/// All passes of a method over a picture of this size, the guard band included, whose samples on each side are `guard`.
+/// All passes of a method over a picture of this size, the guard band included, whose samples on each side are `guard`; `side_size` is that of the second camera's
+/// picture, if there is one.
 pub(super) fn passes(
     method: &ScreenMethod,
     full_size: (u32, u32),
     guard: u32,
     half_resolution: bool,
+    side_size: Option<(u32, u32)>,
 ) -> Vec<Pass> {
     let distances = if half_resolution { Image::FullDistances } else { Image::Distances(0) };
     let mut all = vec![pass(Shader::Distance, Some(Image::Depths), distances, [0.0f32; 4])];
@@ -213,6 +286,9 @@ pub(super) fn passes(
                 };
                 all.push(pass(Shader::Resolve, Some(Image::Map(layer)), Image::Hidden(layer), params));
             }
+            if let Some(size) = side_size {
+                beside(stochastic, size, &mut all);
+            }
             match layered {
                 Layered::Ssao(params) => ssao(params, Some(stochastic), &mut all),
                 Layered::Hbao(params) => hbao(params, Some(stochastic), &mut all),
@@ -223,6 +299,31 @@ pub(super) fn passes(
     let params = PlaceUniform { guard: [guard as i32; 2], is_half, pad: 0.0 };
     all.push(pass(Shader::Place, Some(last), Image::Picture, params));
     all
+}
+
+/// What the second camera sees as distances. Where its map has the first surfaces among the others nothing else is drawn, and nothing is read: the background.
+fn beside(stochastic: &StochasticParams, size: (u32, u32), all: &mut Vec<Pass>) {
+    let depths = stochastic.map.is_first_left_out.then_some(Image::SideDepths);
+    all.push(pass(Shader::Distance, depths, Image::SideDistances, [0.0f32; 4]));
+    let params = ResolveUniform { full_size: [size.0 as i32, size.1 as i32], is_half: 0, pad: 0 };
+    for layer in 0..stochastic.map.samples.div_ceil(HIDDEN_SAMPLES) {
+        all.push(pass(Shader::Resolve, Some(Image::SideMap(layer)), Image::SideHidden(layer), params));
+    }
+}
+
+/// The sampling pass of the first camera, and of the second one over what that has found, if there is one.
+fn samples<P: bytemuck::Pod>(
+    [first, second]: [Shader; 2],
+    hidden: Option<&StochasticParams>,
+    params: P,
+    all: &mut Vec<Pass>,
+) {
+    if hidden.is_some_and(|hidden| hidden.second.is_some()) {
+        all.push(pass(first, None, Image::Value(1), params));
+        all.push(pass(second, Some(Image::Value(1)), Image::Value(0), params));
+    } else {
+        all.push(pass(first, None, Image::Value(0), params));
+    }
 }
 
 const AXES: [[i32; 2]; 2] = [[1, 0], [0, 1]];
@@ -246,7 +347,7 @@ fn ssao(params: &SsaoParams, hidden: Option<&StochasticParams>, all: &mut Vec<Pa
     for (out, pair) in uniform.turns.iter_mut().zip(turns.chunks_exact(2)) {
         *out = [pair[0].x, pair[0].y, pair[1].x, pair[1].y];
     }
-    all.push(pass(Shader::Ssao, None, Image::Value(0), uniform));
+    samples([Shader::Ssao, Shader::SsaoBeside], hidden, uniform, all);
     let middle = crate::ssao::middle_weight(params);
     for (which, axis) in AXES.into_iter().enumerate() {
         let blur = BlurUniform {
@@ -342,7 +443,7 @@ fn hbao(params: &HbaoParams, hidden: Option<&StochasticParams>, all: &mut Vec<Pa
         pad_a: 0.0,
         pad_b: [0.0; 2],
     };
-    all.push(pass(Shader::Hbao, None, Image::Value(0), uniform));
+    samples([Shader::Hbao, Shader::HbaoBeside], hidden, uniform, all);
     bilateral(params.radius_m, params.blur_taps, all)
 }
 

@@ -1,5 +1,7 @@
 //! Shaders without a device, and pictures of the card beside the twins'.
 
+mod second_camera;
+
 use std::mem::offset_of;
 use std::sync::Arc;
 
@@ -18,7 +20,7 @@ use crate::gbuffer::GuardBand;
 use crate::gbuffer::rasterize;
 use crate::hbao::HbaoParams;
 use crate::sao::{MipFilter, SaoParams};
-use crate::sdao::{Looks, MapParams, Picks, StochasticMap};
+use crate::sdao::{Looks, MapParams, Picks, SideParams, StochasticMap};
 use crate::testing::Stage;
 use crate::testing::screen::{look, still_life};
 use crate::upsample::at_half_resolution;
@@ -57,6 +59,10 @@ fn uniforms_are_laid_out_as_in_the_shaders() {
     let members = members!(ScreenUniform: view_from_world_x view_from_world_y view_from_world_z half_extent size
         span is_parallel is_half depth samples_per_metre pad);
     check(Shader::Distance, "Screen", size_of::<ScreenUniform>(), &members);
+    check(Shader::HbaoBeside, "Screen", size_of::<ScreenUniform>(), &members);
+    let members = members!(SideUniform: side_from_main_x side_from_main_y side_from_main_z);
+    check(Shader::HbaoBeside, "SideParams", size_of::<SideUniform>(), &members);
+    check(Shader::SsaoBeside, "SideParams", size_of::<SideUniform>(), &members);
     let members = members!(BilateralUniform: axis taps stride tolerance_m inverse_sigma pad);
     check(Shader::Bilateral, "BilateralParams", size_of::<BilateralUniform>(), &members);
     let members = members!(ObscuranceUniform: radius_m sigma_m bias_m beta exponent samples turns switch_log2
@@ -109,7 +115,12 @@ impl Bench {
         let Bench { gpu, pose, scene, forward, passes } = self;
         passes.draw(gpu, &mut encoder, forward, scene, pose, view).unwrap();
         gpu.queue.submit([encoder.finish()]);
-        let bytes = block_on(read_texture(gpu, passes.picture().unwrap(), 0)).unwrap();
+        self.read(self.passes.picture().unwrap())
+    }
+
+    /// The same of a picture that is drawn already.
+    fn read(&self, picture: &wgpu::Texture) -> Vec<[f32; 2]> {
+        let bytes = block_on(read_texture(&self.gpu, picture, 0)).unwrap();
         let half = |bytes: &[u8]| half_to_f32(u16::from_le_bytes([bytes[0], bytes[1]]));
         bytes.chunks_exact(4).map(|texel| [half(&texel[..2]), half(&texel[2..])]).collect()
     }
@@ -118,8 +129,13 @@ impl Bench {
 impl Bench {
     /// The stochastic map that the last picture was made with, if one was.
     fn map(&self, view: &ScreenView) -> Option<StochasticMap> {
+        self.map_of(view, 0)
+    }
+
+    /// The first camera's, or the second's.
+    fn map_of(&self, view: &ScreenView, camera: usize) -> Option<StochasticMap> {
         let ScreenMethod::Stochastic(_, StochasticParams { map, .. }) = view.method else { return None };
-        let texture = self.passes.hidden().unwrap();
+        let texture = &self.passes.hidden().unwrap()[camera];
         let (columns, pixels) = (texture.width(), (texture.width() * texture.height()) as usize);
         let mut distances_m = vec![f32::INFINITY; pixels * map.samples as usize];
         for layer in 0..map.samples.div_ceil(4) {
@@ -137,17 +153,19 @@ impl Bench {
     }
 }
 
-/// The same by the twins, and the distances of the picture.
-fn twin(stage: &Stage, view: &ScreenView, map: Option<&StochasticMap>) -> (Vec<f32>, Vec<f32>) {
+/// The same by the twins, and the distances of the picture; with the maps that the card has drawn.
+fn twin(stage: &Stage, view: &ScreenView, bench: &Bench) -> (Vec<f32>, Vec<f32>) {
+    let (map, side) = (bench.map(view), second_camera::side_view(stage, view, bench));
+    let (map, side) = (map.as_ref(), side.as_ref());
     let size = [view.size.0, view.size.1];
     let wide = view.guard.rasterize(&stage.scene, &stage.pose, &view.camera, size, 1).unwrap();
     let camera = view.guard.camera(&view.camera, size[1]);
     let screen = wide.screen(&stage.scene, &stage.pose, &camera).unwrap();
     let values = if view.half_resolution {
-        at_half_resolution(&screen, &mut |_| (), |half, _| view.method.estimate_visibility(half, map))
+        at_half_resolution(&screen, &mut |_| (), |half, _| view.method.estimate_visibility(half, map, side))
             .unwrap()
     } else {
-        view.method.estimate_visibility(&screen, map).unwrap()
+        view.method.estimate_visibility(&screen, map, side).unwrap()
     };
     let crop = |values: &[f32]| view.guard.crop(values, size, 1).unwrap();
     (crop(&values), crop(screen.distances_m()))
@@ -191,8 +209,12 @@ fn stochastic() -> Vec<ScreenMethod> {
     let plus = Layered::Hbao(HbaoParams::hbao_plus());
     let usual = StochasticParams::default();
     let with = |samples| StochasticParams { map: MapParams::with_samples(samples), ..usual };
-    let paper =
-        StochasticParams { map: MapParams::paper(8), looks: Looks::WhereFirstIsFar, compensation: 2.0 };
+    let paper = StochasticParams {
+        map: MapParams::paper(8),
+        looks: Looks::WhereFirstIsFar,
+        compensation: 2.0,
+        ..usual
+    };
     let alone = MapParams { picks: Picks::Independent, ..MapParams::with_samples(4) };
     let everywhere = StochasticParams { map: alone, looks: Looks::Everywhere, ..usual };
     [(plus, with(16)), (hbao, with(1)), (plus, paper), (hbao, paper), (plus, everywhere), (hbao, everywhere)]
@@ -204,40 +226,53 @@ fn stochastic() -> Vec<ScreenMethod> {
 fn card_and_twin_agree() {
     let stage = still_life();
     let Some(mut bench) = Bench::new(&stage) else { return };
-    let guards = [GuardBand::default(), GuardBand::of_height(0.2, 37).unwrap()];
     for camera in cameras() {
-        let cases =
-            [((160, 120), guards[0], false), ((61, 37), guards[1], false), ((61, 37), guards[0], true)];
-        let cases = cases.into_iter().chain([((160, 120), guards[1], true)]);
-        for ((size, guard, half_resolution), method) in
-            cases.flat_map(|case| methods().into_iter().map(move |method| (case, method)))
-        {
-            let view = ScreenView { camera, size, method, guard, half_resolution };
-            let card = bench.run(&view);
-            let map = bench.map(&view);
-            let (twin, distances_m) = twin(&stage, &view, map.as_ref());
-            let (mut seen, mut within, mut sum) = (0, 0, 0.0);
-            for ((twin, card), distance) in twin.iter().zip(&card).zip(&distances_m) {
-                // An edge may fall to the other side.
-                if distance.is_finite() != (card[1] < 59_000.0) {
-                    continue;
-                }
-                let off = f64::from((twin - card[0]).abs());
-                seen += 1;
-                within += usize::from(off <= 3.0 / 255.0);
-                sum += off;
-                if !distance.is_finite() {
-                    assert_eq!(card[0], 1.0, "{method:?}: the background is open");
-                }
+        for (size, guard, half_resolution) in cases() {
+            for method in methods() {
+                let view = ScreenView { camera, size, method, guard, half_resolution };
+                check_agreement(&stage, &mut bench, &view);
             }
-            let (part, mean) = (within as f64 / f64::from(seen), sum / f64::from(seen));
-            let name = method.kind().name();
-            let case = format!("{name} {size:?} {guard:?} half {half_resolution} {:?}", camera.projection);
-            eprintln!("{case}: {part:.4} within, mean {mean:.5}");
-            assert!(seen > size.0 * size.1 * 99 / 100, "{method:?}: {seen}");
-            assert!(part > 0.993 && mean < 0.001, "{case}, {method:?}: {part}, {mean}");
         }
     }
+}
+
+/// Sizes, guard bands and resolutions.
+fn cases() -> [((u32, u32), GuardBand, bool); 4] {
+    let guards = [GuardBand::default(), GuardBand::of_height(0.2, 37).unwrap()];
+    [
+        ((160, 120), guards[0], false),
+        ((61, 37), guards[1], false),
+        ((61, 37), guards[0], true),
+        ((160, 120), guards[1], true),
+    ]
+}
+
+/// Draws a picture on the card and by the twin; returns the card's visibility.
+fn check_agreement(stage: &Stage, bench: &mut Bench, view: &ScreenView) -> Vec<f32> {
+    let ScreenView { camera, size, method, guard, half_resolution } = *view;
+    let card = bench.run(view);
+    let (twin, distances_m) = twin(stage, view, bench);
+    let (mut seen, mut within, mut sum) = (0, 0, 0.0);
+    for ((twin, card), distance) in twin.iter().zip(&card).zip(&distances_m) {
+        // An edge may fall to the other side.
+        if distance.is_finite() != (card[1] < 59_000.0) {
+            continue;
+        }
+        let off = f64::from((twin - card[0]).abs());
+        seen += 1;
+        within += usize::from(off <= 3.0 / 255.0);
+        sum += off;
+        if !distance.is_finite() {
+            assert_eq!(card[0], 1.0, "{method:?}: the background is open");
+        }
+    }
+    let (part, mean) = (within as f64 / f64::from(seen), sum / f64::from(seen));
+    let name = method.kind().name();
+    let case = format!("{name} {size:?} {guard:?} half {half_resolution} {:?}", camera.projection);
+    eprintln!("{case}: {part:.4} within, mean {mean:.5}");
+    assert!(seen > size.0 * size.1 * 99 / 100, "{method:?}: {seen}");
+    assert!(part > 0.993 && mean < 0.001, "{case}, {method:?}: {part}, {mean}");
+    card.iter().map(|[visibility, _]| *visibility).collect()
 }
 
 /// Samples that hold the same surface, of those that hold any: a card has other last bits of depths, and other silhouettes.
@@ -281,7 +316,7 @@ fn tiny_pictures_and_guard_bands_are_drawn() {
     let stage = still_life();
     let Some(mut bench) = Bench::new(&stage) else { return };
     for camera in cameras() {
-        for method in methods() {
+        for method in methods().into_iter().chain(second_camera::methods()) {
             for size in [(1, 1), (2, 1), (1, 3), (5, 7)] {
                 for (part, half_resolution) in [(0.0, false), (0.2, true), (0.5, false), (0.0, true)] {
                     let guard = GuardBand::of_height(part, size.1).unwrap();
@@ -311,6 +346,12 @@ fn times() {
     eprintln!("{}", bench.gpu.adapter.get_info().name);
     let kinds = ScreenKind::ALL.map(|kind| (kind.name().to_owned(), kind.method()));
     table(&mut bench, &camera, (960, 540), &kinds);
+    let two = [1, 2].map(|coarseness| {
+        let side = SideParams { coarseness, ..SideParams::default() };
+        let method = ScreenKind::SdHbaoPlus.method().with_second_camera(Some(side));
+        (format!("sd-hbao-plus, two cameras, 1/{coarseness}"), method)
+    });
+    table(&mut bench, &camera, (960, 540), &two);
     for radius_m in [0.1, 0.5, 1.0, 3.0] {
         let pair = [ScreenKind::Alchemy, ScreenKind::Sao]
             .map(|kind| (format!("{} r = {radius_m}", kind.name()), kind.method().with_radius(radius_m)));

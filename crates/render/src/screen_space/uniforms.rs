@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use dapple_scene::{PosedCamera, Projection};
-use glam::Mat3;
+use glam::{Affine3A, Mat3, Vec3};
 
 /// `Screen` in `screen.wgsl`.
 #[repr(C)]
@@ -57,6 +57,25 @@ impl ScreenUniform {
             samples_per_metre: 0.5 * self.samples_per_metre,
             ..self
         }
+    }
+}
+
+/// `SideParams` in `beside.wgsl`: rows of the map from the first camera's view space to the second one's.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub(super) struct SideUniform {
+    pub(super) side_from_main_x: [f32; 4],
+    pub(super) side_from_main_y: [f32; 4],
+    pub(super) side_from_main_z: [f32; 4],
+}
+
+impl SideUniform {
+    pub(super) fn new(side_from_main: &Affine3A) -> SideUniform {
+        let rows = side_from_main.matrix3.transpose();
+        let [x, y, z] = [rows.x_axis, rows.y_axis, rows.z_axis].map(Vec3::from);
+        let t = side_from_main.translation;
+        let [x, y, z] = [x.extend(t.x), y.extend(t.y), z.extend(t.z)].map(|row| row.to_array());
+        SideUniform { side_from_main_x: x, side_from_main_y: y, side_from_main_z: z }
     }
 }
 

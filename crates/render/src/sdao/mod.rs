@@ -13,7 +13,13 @@ mod tests;
 pub use bent::{BentNormals, bent_normals};
 pub use hidden::{Hidden, Looks, Lookup};
 pub use map::{MAX_DISTANCES, MapParams, StochasticMap};
-pub use multi_view::{SideParams, SideView, estimate_visibility as estimate_visibility_of_two};
+pub(crate) use multi_view::check_horizon as check_horizon_of_two;
+#[cfg(feature = "gpu")]
+pub(crate) use multi_view::side_from_main;
+pub use multi_view::{
+    SideParams, SideView, estimate_ssao as estimate_ssao_of_two,
+    estimate_visibility as estimate_visibility_of_two,
+};
 #[cfg(feature = "gpu")]
 pub(crate) use picks::ChoiceTable;
 pub use picks::Picks;

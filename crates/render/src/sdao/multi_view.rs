@@ -1,14 +1,18 @@
-//! HBAO+ from two cameras: the second, to the side, sees surfaces along which the first one looks (\[Vermeer2021\] sec. 3.4, Alg. 3).
+//! HBAO+ and SSAO from two cameras: the second, to the side, sees surfaces along which the first one looks (\[Vermeer2021\] sec. 3.4, Alg. 3).
 
 use dapple_scene::{Pose, PosedCamera, Projection, Scene};
-use glam::{Affine3A, DAffine3, DQuat, DVec3, Mat3A, Vec3A};
+use glam::{Affine3A, DAffine3, DQuat, DVec3, Mat3A, Vec3, Vec3A};
 
 use super::hidden::Lookup;
 use super::map::{MapParams, StochasticMap};
 use crate::bilateral::Bilateral;
 use crate::gbuffer::{Screen, rasterize};
 use crate::hbao::{Centre, Estimator, HbaoParams, Horizon};
+use crate::ssao::{self, SsaoParams};
 use crate::{AfterPass, RenderError, projection};
+
+/// The most of [`SideParams::coarseness`].
+const MAX_COARSENESS: u32 = 8;
 
 /// Where the second camera stands, and how fine its picture is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,12 +46,27 @@ impl SideParams {
                 positive(self.covers_from_m),
                 "finite and above 0",
             ),
-            ("sdao: coarseness", self.coarseness.into(), (1..=8).contains(&self.coarseness), "1 to 8"),
+            (
+                "sdao: coarseness",
+                self.coarseness.into(),
+                (1..=MAX_COARSENESS).contains(&self.coarseness),
+                "1 to 8",
+            ),
         ];
         match checks.into_iter().find(|(_, _, holds, _)| !holds) {
             Some((name, found, _, range)) => Err(RenderError::Parameter { name, found, range }),
             None => Ok(()),
         }
+    }
+
+    /// Of a first picture that has one of four samples: as coarse, up to the coarsest there is.
+    pub fn half(self) -> SideParams {
+        SideParams { coarseness: self.coarseness.saturating_mul(2).min(MAX_COARSENESS), ..self }
+    }
+
+    /// Columns and rows of the second picture, of a first one with so many.
+    pub fn size(&self, [columns, rows]: [u32; 2]) -> [u32; 2] {
+        [columns, rows].map(|count| count.div_ceil(self.coarseness.max(1)))
     }
 
     /// The second camera, for a first one whose picture is so many times as wide as high: to the right of it, turned to the left, with a lens that takes in all of
@@ -140,7 +159,7 @@ impl SideView {
     ) -> Result<SideView, RenderError> {
         map.check()?;
         let camera = side.camera(main, f64::from(columns) / f64::from(rows.max(1)))?;
-        let [width, height] = [columns, rows].map(|count| count.div_ceil(side.coarseness));
+        let [width, height] = side.size([columns, rows]);
         let (screen, map) = if map.is_first_left_out {
             let gbuffer = rasterize(scene, pose, &camera, width, height, 1)?;
             let map = StochasticMap::draw(scene, pose, &camera, &gbuffer, map)?;
@@ -149,17 +168,57 @@ impl SideView {
             let map = StochasticMap::draw_alone(scene, pose, &camera, [width, height], map)?;
             (Screen::of_nothing(&camera, [width, height]), map)
         };
-        let [main, side] = [main, &camera].map(|camera| projection::widen(&camera.world_from_view));
-        Ok(SideView { camera, screen, map, side_from_main: narrow(side.inverse() * main) })
+        Ok(SideView { camera, screen, map, side_from_main: side_from_main(main, &camera) })
+    }
+
+    /// The same with a map that was made elsewhere.
+    #[cfg(all(test, feature = "gpu"))]
+    pub(crate) fn with_map(self, map: StochasticMap) -> SideView {
+        SideView { map, ..self }
+    }
+
+    /// What is known of what it sees, and looked at as the first one's.
+    fn lookup(&self, main: &Lookup<'_>) -> Lookup<'_> {
+        Lookup {
+            hidden: super::Hidden::Stochastic(&self.map),
+            looks: main.looks,
+            compensation: main.compensation,
+        }
+    }
+
+    /// A place and a normal of the first camera's view space in its own, if it sees that place's point of its picture.
+    fn seen(&self, place: Vec3, normal: Vec3) -> Option<(Vec3, Vec3, [f32; 2])> {
+        let place = self.side_from_main.transform_point3(place);
+        let point = self.screen.point_of(place)?;
+        self.screen.sample_in(point)?;
+        Some((place, self.side_from_main.transform_vector3(normal).normalize_or_zero(), point))
     }
 
     /// Where a place of the first picture lies in this one; `None` if it does not.
     fn centre(&self, main: &Centre) -> Option<Centre> {
-        let place = self.side_from_main.transform_point3(main.place);
-        let point = self.screen.point_of(place)?;
-        self.screen.sample_in(point)?;
-        let normal = self.side_from_main.transform_vector3(main.normal).normalize_or_zero();
+        let (place, normal, point) = self.seen(main.place, main.normal)?;
         Some(Centre { point, place, normal, turn: main.turn, jitter: main.jitter })
+    }
+}
+
+/// From the first camera's view space to the second one's.
+pub(crate) fn side_from_main(main: &PosedCamera, side: &PosedCamera) -> Affine3A {
+    let [main, side] = [main, side].map(|camera| projection::widen(&camera.world_from_view));
+    narrow(side.inverse() * main)
+}
+
+/// Whether HBAO's kind can be had of two cameras: HBAO+.
+///
+/// # Errors
+/// [`Horizon::Highest`]: the second camera may see a surface from behind, where its tangent has no angle to begin with.
+pub(crate) fn check_horizon(params: &HbaoParams) -> Result<(), RenderError> {
+    match params.horizon {
+        Horizon::Mean => Ok(()),
+        Horizon::Highest => Err(RenderError::Parameter {
+            name: "sdao: horizon of two cameras",
+            found: 0.0,
+            range: "HBAO+'s mean",
+        }),
     }
 }
 
@@ -177,15 +236,8 @@ pub fn estimate_visibility(
 ) -> Result<Vec<f32>, RenderError> {
     params.check()?;
     lookup.check(screen)?;
-    if params.horizon == Horizon::Highest {
-        // The second camera may see a surface from behind, where its tangent has no angle to begin with.
-        return Err(RenderError::Parameter {
-            name: "sdao: horizon of two cameras",
-            found: 0.0,
-            range: "HBAO+'s mean",
-        });
-    }
-    let beside = Lookup { hidden: super::Hidden::Stochastic(&side.map), ..*lookup };
+    check_horizon(params)?;
+    let beside = side.lookup(lookup);
     let main = Estimator::new(screen, params, lookup);
     let second = Estimator::new(&side.screen, params, &beside);
     let visibility = screen.map(|at| match main.centre(at) {
@@ -199,4 +251,23 @@ pub fn estimate_visibility(
     let visibility = Bilateral::within(params.radius_m, params.blur_taps).smooth(screen, &visibility);
     after("blur");
     Ok(visibility)
+}
+
+/// Visibility as of [`ssao::estimate_visibility_with`](crate::ssao::estimate_visibility_with), the more occlusion of what both cameras see, which is Alg. 3's
+/// line 5 for places in a hemisphere. `lookup` is of the first one; `after` is told when each pass is done: `samples`, `blur`.
+///
+/// # Errors
+/// A parameter out of its range, or hidden surfaces of another picture.
+pub fn estimate_ssao(
+    screen: &Screen,
+    params: &SsaoParams,
+    lookup: &Lookup<'_>,
+    side: &SideView,
+    after: AfterPass<'_>,
+) -> Result<Vec<f32>, RenderError> {
+    let beside = side.lookup(lookup);
+    ssao::estimate_with_more(screen, params, lookup, after, |estimator, place, normal, turn| {
+        let seen = side.seen(place, normal);
+        seen.map_or(0.0, |(place, normal, _)| estimator.occlusion(&side.screen, &beside, place, normal, turn))
+    })
 }

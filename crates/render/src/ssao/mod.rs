@@ -97,13 +97,32 @@ pub fn estimate_by_passes(
     lookup: &Lookup<'_>,
     after: AfterPass<'_>,
 ) -> Result<Vec<f32>, RenderError> {
+    estimate_with_more(screen, params, lookup, after, |_, _, _, _| 0.0)
+}
+
+/// As [`estimate_by_passes`]; of each sample the more of its occlusion and of `more`, which is given place and normal in view space, and turn.
+///
+/// # Errors
+/// As there.
+pub(crate) fn estimate_with_more(
+    screen: &Screen,
+    params: &SsaoParams,
+    lookup: &Lookup<'_>,
+    after: AfterPass<'_>,
+    more: impl Fn(&Estimator<'_>, Vec3, Vec3, Vec3) -> f32 + Sync,
+) -> Result<Vec<f32>, RenderError> {
     params.check()?;
     lookup.check(screen)?;
     let pattern = Pattern::new(params.samples, params.seed);
+    let estimator = Estimator { params, offsets: &pattern.offsets };
     let columns = screen.columns() as usize;
     let occlusion = screen.map(|[column, row]| {
+        let index = row * columns + column;
+        let normal = screen.normals_view()[index];
+        // A triangle without an area has no normal.
+        let Some(place) = screen.position_view(index).filter(|_| normal != Vec3::ZERO) else { return 0.0 };
         let turn = pattern.turn(column, row);
-        occlusion_at(screen, lookup, row * columns + column, &pattern.offsets, turn, params)
+        estimator.occlusion(screen, lookup, place, normal, turn).max(more(&estimator, place, normal, turn))
     });
     after("samples");
     // Blurred as occlusion, so that what is open stays exactly 1.
@@ -128,40 +147,47 @@ pub(crate) fn middle_weight(params: &SsaoParams) -> f32 {
     blur::weights(params.blur_width, params.blur_sigma)[0]
 }
 
-/// Part of the places around a sample that lie behind what the picture shows.
-fn occlusion_at(
-    screen: &Screen,
-    lookup: &Lookup<'_>,
-    index: usize,
-    offsets: &[Vec3],
-    turn: Vec3,
-    params: &SsaoParams,
-) -> f32 {
-    let normal = screen.normals_view()[index];
-    // A triangle without an area has no normal.
-    let Some(position) = screen.position_view(index).filter(|_| normal != Vec3::ZERO) else { return 0.0 };
-    let tangent = tangent(normal, turn);
-    let bitangent = normal.cross(tangent);
-    let (radius, height) = (params.radius_m, params.bias * params.radius_m);
-    let (mut seen, mut hidden) = (0u32, 0u32);
-    for offset in offsets {
-        let place = position + (tangent * offset.x + bitangent * offset.y + normal * offset.z) * radius;
-        let is_blocked_by = |by: Vec3| {
-            let to_seen = by - position;
-            let is_nearer = by.z > place.z;
-            let is_within = to_seen.length_squared() <= radius * radius;
-            // What hides a place of the hemisphere from an eye above the plane is above it, too: only rounding to samples says else.
-            is_nearer && is_within && normal.dot(to_seen) > height
-        };
-        let Some(other) = screen.point_of(place).and_then(|point| screen.sample_in(point)) else { continue };
-        // Where the first surface blocks, others change nothing: whether they are looked at there (sec. 3.3) is a matter of time alone.
-        if screen.position_at(other).is_some_and(is_blocked_by) {
-            seen += 1;
-        } else if lookup.places(screen, other).any(is_blocked_by) {
-            hidden += 1;
+/// Looks at places around others.
+pub(crate) struct Estimator<'a> {
+    params: &'a SsaoParams,
+    offsets: &'a [Vec3],
+}
+
+impl Estimator<'_> {
+    /// Part of the places around a position of the view space of a picture, whose surface has this normal, that lie behind what the picture shows.
+    pub(crate) fn occlusion(
+        &self,
+        screen: &Screen,
+        lookup: &Lookup<'_>,
+        position: Vec3,
+        normal: Vec3,
+        turn: Vec3,
+    ) -> f32 {
+        let tangent = tangent(normal, turn);
+        let bitangent = normal.cross(tangent);
+        let (radius, height) = (self.params.radius_m, self.params.bias * self.params.radius_m);
+        let (mut seen, mut hidden) = (0u32, 0u32);
+        for offset in self.offsets {
+            let place = position + (tangent * offset.x + bitangent * offset.y + normal * offset.z) * radius;
+            let is_blocked_by = |by: Vec3| {
+                let to_seen = by - position;
+                let is_nearer = by.z > place.z;
+                let is_within = to_seen.length_squared() <= radius * radius;
+                // What hides a place of the hemisphere from an eye above the plane is above it, too: only rounding to samples says else.
+                is_nearer && is_within && normal.dot(to_seen) > height
+            };
+            let Some(other) = screen.point_of(place).and_then(|point| screen.sample_in(point)) else {
+                continue;
+            };
+            // Where the first surface blocks, others change nothing: whether they are looked at there (sec. 3.3) is a matter of time alone.
+            if screen.position_at(other).is_some_and(is_blocked_by) {
+                seen += 1;
+            } else if lookup.places(screen, other).any(is_blocked_by) {
+                hidden += 1;
+            }
         }
+        (seen as f32 + lookup.compensation * hidden as f32) / self.offsets.len() as f32
     }
-    (seen as f32 + lookup.compensation * hidden as f32) / offsets.len() as f32
 }
 
 /// The unit vector of the plane with unit normal `normal` that is nearest to `turn`.

@@ -19,3 +19,12 @@ fn fragment(v: Varyings, @builtin(front_facing) is_front: bool) -> @location(0) 
     let normal = unit_or(across * side, unit_or(v.normal_world, to_viewer * facing) * facing);
     return vec4(normal * 0.5 + 0.5, 1.0);
 }
+
+// Where depths are all that is wanted.
+@fragment
+fn depth_fragment(v: Varyings) {
+    let base_texel = textureSample(base_color_texture, base_color_sampler, image_coordinates(material.base_color_use, v.uv));
+    if CUTS_HOLES && material.base_color.a * v.color.a * base_texel.a < material.cutoff {
+        discard;
+    }
+}

@@ -54,19 +54,40 @@ fn chosen_of_four(at: vec2<i32>, full_size: vec2<i32>) -> vec2<i32> {
     return min(at * 2 + ((at.yx & vec2(1)) ^ vec2(1)), full_size - 1);
 }
 
-// The point of the picture that a sample is of.
-fn centre(at: vec2<i32>) -> vec2<f32> {
-    if screen.is_half == 0u {
+// The point that a sample is of, of a picture whose width and height in samples is `span`, and which may have one of four alone.
+fn centre_of(at: vec2<i32>, span: vec2<f32>, is_half: u32) -> vec2<f32> {
+    if is_half == 0u {
         return vec2<f32>(at) + 0.5;
     }
-    return 0.5 * vec2<f32>(chosen_of_four(at, vec2<i32>(2.0 * screen.span))) + 0.25;
+    return 0.5 * vec2<f32>(chosen_of_four(at, vec2<i32>(2.0 * span))) + 0.25;
+}
+
+fn centre(at: vec2<i32>) -> vec2<f32> {
+    return centre_of(at, screen.span, screen.is_half);
+}
+
+// The place at a distance that a part of a picture shows: 0 … 1 from the left and from the top.
+fn place_in(part: vec2<f32>, distance: f32, half_extent: vec2<f32>, is_parallel: u32) -> vec3<f32> {
+    let across = vec2(2.0, -2.0) * part + vec2(-1.0, 1.0);
+    let scale = select(distance, 1.0, is_parallel != 0u);
+    return vec3(across * half_extent * scale, -distance);
 }
 
 // The place at a distance that a point of the picture shows; the first sample's centre is at (0.5, 0.5).
 fn place_view(point: vec2<f32>, distance: f32) -> vec3<f32> {
-    let across = vec2(2.0, -2.0) * point / screen.span + vec2(-1.0, 1.0);
-    let scale = select(distance, 1.0, screen.is_parallel != 0u);
-    return vec3(across * screen.half_extent * scale, -distance);
+    return place_in(point / screen.span, distance, screen.half_extent, screen.is_parallel);
+}
+
+// The point of the picture, or beside it, that a place falls on; a point outside where the place is behind the camera.
+fn point_of(place: vec3<f32>) -> vec2<f32> {
+    var scale = 1.0;
+    if screen.is_parallel == 0u {
+        if place.z >= 0.0 {
+            return vec2(-1.0);
+        }
+        scale = -1.0 / place.z;
+    }
+    return (vec2(0.5) + vec2(0.5, -0.5) * place.xy * scale / screen.half_extent) * screen.span;
 }
 
 // The place that a sample sees, and 1; 0 for the background and outside of the picture.
@@ -81,9 +102,8 @@ fn place_at(at: vec2<i32>) -> vec4<f32> {
     return vec4(place_view(centre(at), distance), 1.0);
 }
 
-// A sample's unit normal in view space; zero where it has none.
-fn normal_at(at: vec2<i32>) -> vec3<f32> {
-    let texel = textureLoad(normals, at, 0);
+// What a texel of normals is in view space, a unit vector; zero where it has none.
+fn normal_view(texel: vec4<f32>) -> vec3<f32> {
     if texel.a < 0.5 {
         return vec3(0.0);
     }
@@ -92,6 +112,11 @@ fn normal_at(at: vec2<i32>) -> vec3<f32> {
     let y = dot(screen.view_from_world_y.xyz, n);
     let z = dot(screen.view_from_world_z.xyz, n);
     return normalize(vec3(x, y, z));
+}
+
+// A sample's normal.
+fn normal_at(at: vec2<i32>) -> vec3<f32> {
+    return normal_view(textureLoad(normals, at, 0));
 }
 
 // The sample that a point of the picture lies in; one outside where that is outside.

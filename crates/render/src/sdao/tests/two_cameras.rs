@@ -108,6 +108,32 @@ fn two_cameras(side: SideParams, map: MapParams) -> impl Fn(&Shot<'_>) -> Vec<f3
     }
 }
 
+/// SSAO of two cameras.
+fn two_cameras_of_ssao(side: SideParams, map: MapParams) -> impl Fn(&Shot<'_>) -> Vec<f32> + Sync {
+    move |shot| {
+        let Shot { stage: Stage { scene, pose }, camera, gbuffer, screen } = shot;
+        let size = [screen.columns(), screen.rows()];
+        let own = StochasticMap::draw(scene, pose, camera, gbuffer, &map).unwrap();
+        let side = SideView::draw(scene, pose, camera, size, &side, &map).unwrap();
+        let lookup = Lookup::stochastic(&own);
+        estimate_ssao_of_two(screen, &SsaoParams::default(), &lookup, &side, &mut |_| ()).unwrap()
+    }
+}
+
+#[test]
+fn walls_are_open_and_pictures_are_pictures_to_ssao_too() {
+    for (side, map) in [(SideParams::default(), MapParams::with_samples(4)), (HALF, MapParams::paper(4))] {
+        let estimate = two_cameras_of_ssao(side, map);
+        check_walls_of(&estimate, 75.0, 0.99);
+        check_pictures_of(&estimate);
+        let alone = |screen: &Screen| ssao::estimate_visibility(screen, &SsaoParams::default()).unwrap();
+        for (found, alone) in corner_profile_of(&estimate, 0.6).iter().zip(corner_profile(&alone, 0.6)) {
+            println!("{found:?}, {alone:?}");
+            assert!((-0.12..0.01).contains(&(found[0] - alone[0])), "{found:?}, {alone:?}");
+        }
+    }
+}
+
 #[test]
 fn walls_are_open_pictures_are_pictures_and_a_corner_is_one() {
     for (side, map) in [(SideParams::default(), MapParams::with_samples(4)), (HALF, MapParams::paper(4))] {
@@ -153,11 +179,14 @@ fn a_wall_that_the_first_camera_looks_along_is_found() {
         (far, MapParams::paper(16)),
         (SideParams { coarseness: 2, ..far }, MapParams::with_samples(4)),
     ] {
-        let found = two_cameras(side, map)(&shot);
-        let sides = [1.0, -1.0].map(|sign| beside(&found, sign));
-        println!("{side:?} {sides:?}");
-        assert!(sides[0] < 0.8, "the wall that the second camera faces: {sides:?}");
-        assert!(sides[1] > 0.98, "no camera sees the other one: {sides:?}");
+        let both = [two_cameras(side, map)(&shot), two_cameras_of_ssao(side, map)(&shot)];
+        // Of SSAO's hemisphere the wall is within the radius in less.
+        for (found, dark) in both.iter().zip([0.8, 0.9]) {
+            let sides = [1.0, -1.0].map(|sign| beside(found, sign));
+            println!("{side:?} {sides:?}");
+            assert!(sides[0] < dark, "the wall that the second camera faces: {sides:?}");
+            assert!(sides[1] > 0.98, "no camera sees the other one: {sides:?}");
+        }
     }
 }
 
