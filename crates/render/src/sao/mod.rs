@@ -5,7 +5,6 @@
 mod bilateral;
 mod pack;
 mod params;
-pub mod precision;
 mod pyramid;
 mod sample;
 #[cfg(test)]
