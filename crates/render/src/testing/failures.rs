@@ -7,7 +7,6 @@ use glam::{Affine3A, Vec3};
 
 use super::screen::{EstimateShot, Shot, look};
 use super::{Stage, check_golden, cube, ground, quad};
-use crate::compose::view_visibility;
 use crate::gbuffer::{GBuffer, GuardBand, rasterize};
 use crate::image::Rgb8Image;
 
@@ -17,6 +16,9 @@ const WINDOW: [u32; 2] = [104, 72];
 /// Between pictures of the strip.
 const GAP: u32 = 4;
 const GRAY: [u8; 3] = [128; 3];
+/// Visibility that the strip shows as black.
+const BLACK: f32 = 0.5;
+const BLUE: [u8; 3] = [60, 130, 240];
 
 /// A scene, a camera, and the place on its first instance that tells.
 struct Case {
@@ -134,7 +136,7 @@ impl Case {
             })
             .collect();
         let mut values = vec![0.0; sites.len()];
-        trace_visibility(&tracer, &sites, &RtaoParams { rays: 256, ..RtaoParams::default() }, &mut values);
+        trace_visibility(&tracer, &sites, &RtaoParams { rays: 1024, ..RtaoParams::default() }, &mut values);
         values
     }
 
@@ -152,12 +154,18 @@ impl Case {
         sum / count
     }
 
+    /// Visibility from [`BLACK`] to 1 as gray; what is not the first instance is half blue.
     fn window(&self, gbuffer: &GBuffer, values: &[f32]) -> Rgb8Image {
-        let whole = view_visibility(gbuffer, values).unwrap();
-        let [left, top] = self.window.map(|at| at as usize);
-        let [width, height] = WINDOW.map(|side| side as usize);
-        let rows = whole.pixels.chunks(whole.width as usize).skip(top).take(height);
-        let pixels = rows.flat_map(|row| &row[left..left + width]).copied().collect();
+        let shown = |index: usize| {
+            let shade = (255.0 * (values[index] - BLACK) / (1.0 - BLACK)).round().clamp(0.0, 255.0) as u8;
+            match gbuffer.samples()[index].instance {
+                0 => [shade; 3],
+                _ => BLUE.map(|channel| channel / 2 + shade / 2),
+            }
+        };
+        let [left, top] = self.window;
+        let rows = (top..top + WINDOW[1]).flat_map(|y| (left..left + WINDOW[0]).map(move |x| (x, y)));
+        let pixels = rows.map(|(x, y)| shown((y * SIZE[0] + x) as usize)).collect();
         Rgb8Image { width: WINDOW[0], height: WINDOW[1], pixels }
     }
 }
