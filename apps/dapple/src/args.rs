@@ -136,7 +136,8 @@ pub(crate) struct VisibilityArgs {
     #[arg(long, value_name = "X", default_value_t = 0.0)]
     pub(crate) adaptive: f32,
     /// Two more bytes a point that say from where light comes to it, so that ambient light of several colours is gathered from there.
-    /// In pictures of `eval` and `render`; windows and pages do not use them yet.
+    /// In pictures of `eval` and `render`; windows and pages do not use them yet. `render` has them of rtao, and of hbao and hbao-plus, with hidden surfaces too,
+    /// from the picture alone.
     #[arg(long)]
     pub(crate) bent_normals: bool,
 }

@@ -1,5 +1,6 @@
 //! Scenes made by hand, and golden images, for this crate's tests.
 
+pub(crate) mod failures;
 pub(crate) mod screen;
 
 use std::path::PathBuf;
@@ -210,8 +211,19 @@ pub(crate) fn check_golden(folder: &str, name: &str, picture: &Rgb8Image) {
 
 /// Writes a picture, for goldens and for looking at.
 pub(crate) fn write_png(path: &std::path::Path, picture: &Rgb8Image) {
-    let bytes: Vec<u8> = picture.pixels.iter().flatten().copied().collect();
-    ::image::save_buffer(path, &bytes, picture.width, picture.height, ::image::ColorType::Rgb8).unwrap();
+    use ::image::codecs::png::{CompressionType, FilterType, PngEncoder};
+    use ::image::{ExtendedColorType, ImageEncoder};
+
+    let mut bytes = Vec::new();
+    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Best, FilterType::Adaptive);
+    // Of gray pictures one channel says all.
+    let is_gray = picture.pixels.iter().all(|[r, g, b]| r == g && g == b);
+    let (values, color): (Vec<u8>, _) = match is_gray {
+        true => (picture.pixels.iter().map(|pixel| pixel[0]).collect(), ExtendedColorType::L8),
+        false => (picture.pixels.iter().flatten().copied().collect(), ExtendedColorType::Rgb8),
+    };
+    encoder.write_image(&values, picture.width, picture.height, color).unwrap();
+    std::fs::write(path, bytes).unwrap();
 }
 
 /// A checkerboard of `n × n` texels in two colours.

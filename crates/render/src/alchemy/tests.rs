@@ -1,6 +1,7 @@
 //! What AlchemyAO keeps to: the general rules of screen-space methods, and a corner.
 
 use super::*;
+use crate::testing::failures;
 use crate::testing::screen::{
     check_golden_view, check_lenses, check_pictures, check_profile, check_walls, corner_profile,
 };
@@ -41,4 +42,12 @@ fn parameters_out_of_range_are_named() {
 #[test]
 fn golden_views() {
     check_golden_view("alchemy", "still-life", &estimate(AlchemyParams::default()));
+}
+
+#[test]
+fn failures_are_as_they_are_told() {
+    let [truth, found] =
+        failures::check("alchemy", "alchemy", &|shot| estimate(AlchemyParams::default())(shot.screen));
+    assert!(found.halo < 0.93, "{found:?}: no end at the radius");
+    assert!((0.01..0.06).contains(&(truth.thin - found.thin)), "{found:?}");
 }

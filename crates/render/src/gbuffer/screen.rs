@@ -129,9 +129,9 @@ impl Screen {
     /// The point of the picture that the sample in a column and row is of, as of [`Screen::place_view`]: the middle of its square, but not in a
     /// [`Screen::half`]. The sample must be in the picture.
     pub fn centre(&self, [column, row]: [usize; 2]) -> [f32; 2] {
-        match self.centres.is_empty() {
-            true => [column as f32 + 0.5, row as f32 + 0.5],
-            false => self.centres[row * self.columns as usize + column],
+        match self.is_half() {
+            false => [column as f32 + 0.5, row as f32 + 0.5],
+            true => self.centres[row * self.columns as usize + column],
         }
     }
 
@@ -195,6 +195,11 @@ impl Screen {
             distances_m: sources.iter().map(|&i| self.distances_m[i]).collect(),
             normals_view: sources.iter().map(|&i| self.normals_view[i]).collect(),
         }
+    }
+
+    /// Whether it is a [`Screen::half`] of another.
+    pub(crate) fn is_half(&self) -> bool {
+        !self.centres.is_empty()
     }
 
     /// The sample that lies so many to the right and down of another's centre; `None` outside of the picture.
@@ -314,6 +319,27 @@ mod tests {
             let camera = PosedCamera { projection, ..look(Vec3::new(1.5, 2.0, 3.0), Vec3::ZERO) };
             let (gbuffer, screen) = draw(&still_life(), &camera, [61, 37]);
             assert_eq!(gbuffer.distances_m(&camera), screen.distances_m());
+        }
+    }
+
+    /// What is recovered from a depth projects back to its sample and to that depth.
+    #[test]
+    fn places_project_back() {
+        for lens in [
+            Projection::Perspective { yfov: 0.8, near: 0.02 },
+            Projection::Orthographic { half_height: 2.0, near: -3.0, far: 20.0 },
+        ] {
+            let camera = PosedCamera { projection: lens, ..look(Vec3::new(1.5, 2.0, 3.0), Vec3::ZERO) };
+            let (gbuffer, screen) = draw(&still_life(), &camera, [61, 37]);
+            let matrix = projection::clip_from_view(&camera.projection, 61.0 / 37.0);
+            for (i, sample) in gbuffer.samples().iter().enumerate() {
+                let Some(place) = screen.position_view(i) else { continue };
+                let clip = matrix * place.as_dvec3().extend(1.0);
+                let column = (0.5 + 0.5 * clip.x / clip.w) * 61.0 - 0.5;
+                let row = (0.5 - 0.5 * clip.y / clip.w) * 37.0 - 0.5;
+                assert!((column - (i % 61) as f64).abs() < 1e-4 && (row - (i / 61) as f64).abs() < 1e-4);
+                assert!((clip.z / clip.w - f64::from(sample.depth)).abs() < 1e-6);
+            }
         }
     }
 

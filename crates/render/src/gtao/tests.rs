@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::*;
+use crate::testing::failures;
 use crate::testing::screen::{
     check_golden_view, check_lenses, check_pictures, check_walls, corner_profile, look, still_life,
 };
@@ -85,4 +86,12 @@ fn parameters_out_of_range_are_named() {
 #[test]
 fn golden_views() {
     check_golden_view("gtao", "still-life", &estimate(GtaoParams::default()));
+}
+
+#[test]
+fn failures_are_as_they_are_told() {
+    let [truth, found] =
+        failures::check("gtao", "gtao", &|shot| estimate(GtaoParams::default())(shot.screen));
+    assert!(found.halo > 0.99, "{found:?}: an end at the radius");
+    assert!(truth.thin - found.thin > 0.1, "{found:?}: as thick as half of the radius");
 }

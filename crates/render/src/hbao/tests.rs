@@ -1,6 +1,7 @@
 //! What HBAO, and HBAO+, keeps to: the general rules of screen-space methods, and a corner.
 
 use super::*;
+use crate::testing::failures;
 use crate::testing::screen::{
     check_golden_view, check_lenses, check_pictures, check_profile, check_walls, corner_profile,
 };
@@ -45,4 +46,14 @@ fn parameters_out_of_range_are_named() {
 fn golden_views() {
     check_golden_view("hbao", "hbao", &estimate(HbaoParams::hbao()));
     check_golden_view("hbao", "hbao-plus", &estimate(HbaoParams::hbao_plus()));
+}
+
+#[test]
+fn failures_are_as_they_are_told() {
+    let check = |name, params| failures::check("hbao", name, &|shot| estimate(params)(shot.screen));
+    let [[truth, hbao], [_, plus]] =
+        [check("hbao", HbaoParams::hbao()), check("hbao-plus", HbaoParams::hbao_plus())];
+    assert!(hbao.halo > 0.99 && plus.halo > 0.99, "an end at the radius: {hbao:?}, {plus:?}");
+    assert!(truth.thin - hbao.thin > 0.08, "{hbao:?}: all under the horizon is taken for solid");
+    assert!((0.03..0.08).contains(&(truth.thin - plus.thin)), "{plus:?}");
 }

@@ -3,11 +3,8 @@
 //! Takes distances of a picture's samples ([`Screen`]); returns one visibility a sample. See `README.md`.
 
 mod bilateral;
-#[cfg(test)]
-mod failures;
 mod pack;
 mod params;
-pub mod precision;
 mod pyramid;
 mod sample;
 #[cfg(test)]

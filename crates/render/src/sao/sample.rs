@@ -47,7 +47,7 @@ impl<'a> Sampler<'a> {
         let (screen, pyramid, params) = (self.screen, self.pyramid, self.params);
         visit(0, 0, at);
         let Some(place) = screen.position_at(at) else { return 1.0 };
-        let normal = normal_view(screen, at);
+        let normal = normal_seen(screen, at);
         let radius = params.radius_m * screen.samples_per_metre(-place.z);
         let turn = alchemy_turn(at);
         let top = pyramid.levels() - 1;
@@ -68,6 +68,12 @@ impl<'a> Sampler<'a> {
         }
         self.estimator.visibility(sum)
     }
+}
+
+/// From depths; at half resolution, where they lie twice as far apart, the geometry's, which upsampling needs there anyway.
+fn normal_seen(screen: &Screen, at: [usize; 2]) -> Vec3 {
+    let own = screen.normals_view()[at[1] * screen.columns() as usize + at[0]];
+    if screen.is_half() && own != Vec3::ZERO { own } else { normal_view(screen, at) }
 }
 
 /// Eq. 4: the face's normal, from the places that a sample's quad of 2 × 2 shows. Towards the eye. A picture of one row or column, and an edge of the background, leave

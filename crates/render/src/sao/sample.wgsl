@@ -31,6 +31,17 @@ fn quad_normal(at: vec2<i32>) -> vec3<f32> {
     return select(vec3(0.0, 0.0, 1.0), across * inverseSqrt(max(length_squared, 1e-38)), length_squared > 1e-38);
 }
 
+// From depths; at half resolution, where they lie twice as far apart, the geometry's, which upsampling needs there anyway.
+fn normal_seen(at: vec2<i32>) -> vec3<f32> {
+    if screen.is_half != 0u {
+        let own = normal_at(at);
+        if any(own != vec3(0.0)) {
+            return own;
+        }
+    }
+    return quad_normal(at);
+}
+
 // The distance of the texel of a level that a sample lies in, and the point of the picture that it stands for.
 fn read_level(level: u32, at: vec2<u32>) -> vec3<f32> {
     var texel = at >> vec2(level);
@@ -55,7 +66,7 @@ fn visibility_at(at: vec2<i32>) -> f32 {
     if place.w == 0.0 {
         return 1.0;
     }
-    let normal = quad_normal(at);
+    let normal = normal_seen(at);
     let distance = -place.z;
     let radius = params.radius_m * samples_per_metre(distance);
     let turn = alchemy_turn(at);

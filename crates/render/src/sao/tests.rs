@@ -4,6 +4,7 @@ use glam::Vec3;
 use proptest::prelude::*;
 
 use super::*;
+use crate::testing::failures;
 use crate::testing::screen::{
     check_golden_view, check_lenses, check_pictures, check_profile, check_walls, corner_profile, draw, look,
     still_life,
@@ -168,4 +169,11 @@ proptest! {
 #[test]
 fn golden_views() {
     check_golden_view("sao", "still-life", &estimate(SaoParams::default()));
+}
+
+#[test]
+fn failures_are_as_they_are_told() {
+    let [truth, found] = failures::check("sao", "sao", &|shot| estimate(SaoParams::default())(shot.screen));
+    assert!(found.halo < 0.93, "{found:?}: no end at the radius");
+    assert!((0.04..0.1).contains(&(truth.thin - found.thin)), "{found:?}");
 }

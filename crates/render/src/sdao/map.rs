@@ -94,7 +94,7 @@ impl StochasticMap {
         StochasticMap::drawn(scene, pose, camera, &view, params.is_first_left_out.then_some(gbuffer), params)
     }
 
-    /// Draws a map of what a camera sees without a G-buffer: first surfaces are among the others, whatever the parameters say.
+    /// Draws a map of what a camera sees without a G-buffer, of a picture of so many pixels: first surfaces are among the others, whatever the parameters say.
     ///
     /// # Errors
     /// Those of [`StochasticMap::draw`].
@@ -103,9 +103,10 @@ impl StochasticMap {
         pose: &Pose,
         camera: &PosedCamera,
         size: [u32; 2],
+        samples_per_axis: u32,
         params: &MapParams,
     ) -> Result<StochasticMap, RenderError> {
-        let view = View::checked(scene, pose, camera, size, 1)?;
+        let view = View::checked(scene, pose, camera, size, samples_per_axis)?;
         StochasticMap::drawn(scene, pose, camera, &view, None, params)
     }
 

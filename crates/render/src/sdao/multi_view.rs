@@ -6,7 +6,7 @@ use glam::{Affine3A, DAffine3, DQuat, DVec3, Mat3A, Vec3, Vec3A};
 use super::hidden::Lookup;
 use super::map::{MapParams, StochasticMap};
 use crate::bilateral::Bilateral;
-use crate::gbuffer::{Screen, rasterize};
+use crate::gbuffer::{MAX_SIDE, Screen, rasterize};
 use crate::hbao::{Centre, Estimator, HbaoParams, Horizon};
 use crate::ssao::{self, SsaoParams};
 use crate::{AfterPass, RenderError, projection};
@@ -159,14 +159,17 @@ impl SideView {
     ) -> Result<SideView, RenderError> {
         map.check()?;
         let camera = side.camera(main, f64::from(columns) / f64::from(rows.max(1)))?;
-        let [width, height] = side.size([columns, rows]);
+        let counts = side.size([columns, rows]);
+        // More samples than a picture may have pixels: several to a pixel.
+        let per_axis = counts.into_iter().max().unwrap_or(1).div_ceil(MAX_SIDE).max(1);
+        let [width, height] = counts.map(|count| count.div_ceil(per_axis));
         let (screen, map) = if map.is_first_left_out {
-            let gbuffer = rasterize(scene, pose, &camera, width, height, 1)?;
+            let gbuffer = rasterize(scene, pose, &camera, width, height, per_axis)?;
             let map = StochasticMap::draw(scene, pose, &camera, &gbuffer, map)?;
             (gbuffer.screen(scene, pose, &camera)?, map)
         } else {
-            let map = StochasticMap::draw_alone(scene, pose, &camera, [width, height], map)?;
-            (Screen::of_nothing(&camera, [width, height]), map)
+            let map = StochasticMap::draw_alone(scene, pose, &camera, [width, height], per_axis, map)?;
+            (Screen::of_nothing(&camera, [width, height].map(|side| side * per_axis)), map)
         };
         Ok(SideView { camera, screen, map, side_from_main: side_from_main(main, &camera) })
     }

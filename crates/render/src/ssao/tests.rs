@@ -5,6 +5,7 @@ use glam::{Affine3A, Vec3};
 use proptest::prelude::*;
 
 use super::*;
+use crate::testing::failures;
 use crate::testing::screen::{beside_a_wall, check_golden_view, check_walls, corner, draw, look, still_life};
 use crate::testing::{Stage, cube, ground, sphere, turned, with_threads};
 
@@ -214,4 +215,14 @@ proptest! {
 #[test]
 fn golden_view() {
     check_golden_view("ssao", "still-life", &estimate);
+}
+
+#[test]
+fn failures_are_as_they_are_told() {
+    let [truth, found] = failures::check("ssao", "ssao", &|shot| estimate(shot.screen));
+    assert!(found.halo > 0.99, "{found:?}: an end at the radius");
+    assert!(
+        (0.0..0.04).contains(&(truth.thin - found.thin)),
+        "{found:?}: only what is near a place blocks it"
+    );
 }

@@ -17,6 +17,9 @@ pub const BLOCK_TEXELS: usize = 64;
 /// Set in a [`BlockKey::chart`] that is a family of slabs, not a chart; the axis is in the low bits.
 pub const SLABS: u32 = 1 << 31;
 
+/// Set in a [`BlockKey::chart`] of surfaces seen from behind: light on the two sides of a thing has nothing in common.
+pub const BACK: u32 = 1 << 30;
+
 /// A block of 8×8 texels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct BlockKey {

@@ -25,7 +25,7 @@ pub use ris::{RisParams, trace_ris};
 pub use sequence::Sequence;
 
 use crate::bvh::{MAX_DIRECTIONS, Ray, Tracer, offset_origin};
-use sequence::Draws;
+pub(crate) use sequence::Draws;
 
 /// Most samples a pixel.
 pub const MAX_SAMPLES: u32 = 65_536;

@@ -18,14 +18,14 @@ const LATTICE: [u64; 3] = [0xd1b5_4a32_d192_ed03, 0xabc9_8388_fb8f_ac02, 0x8cb9_
 
 /// The numbers of one place in one frame.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Draws {
+pub(crate) enum Draws {
     Random { stream: u64 },
     Lattice { offset: [u64; 3], first: u64 },
 }
 
 impl Draws {
     /// Of a place that draws `count` samples a frame.
-    pub(super) fn new(sequence: Sequence, seed: u64, site: u64, frame: u64, count: u32) -> Draws {
+    pub(crate) fn new(sequence: Sequence, seed: u64, site: u64, frame: u64, count: u32) -> Draws {
         match sequence {
             Sequence::Random => Draws::Random { stream: stream(seed, site, frame, 0) },
             Sequence::Lattice => Draws::Lattice {
@@ -36,7 +36,7 @@ impl Draws {
     }
 
     /// Those of sample `index` of the frame, each in `[0, 1)`.
-    pub(super) fn at(&self, index: u32) -> [f32; 3] {
+    pub(crate) fn at(&self, index: u32) -> [f32; 3] {
         match self {
             Draws::Random { stream } => [0, 1, 2].map(|d| unit_interval(hash(*stream, u64::from(index), d))),
             Draws::Lattice { offset, first } => {

@@ -24,6 +24,11 @@ impl Seen {
         Ok(Seen { moment, gbuffer, screen })
     }
 
+    /// Distances from depths: what SAO alone needs of the geometry.
+    pub(super) fn distances_m(&self) -> Vec<f32> {
+        self.gbuffer.distances_m(&self.moment.camera)
+    }
+
     /// Samples with the guard band.
     pub(super) fn samples(&self) -> usize {
         self.screen.distances_m().len()
@@ -46,10 +51,24 @@ fn median(values: &[f64]) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
+fn least(values: &[f64]) -> f64 {
+    values.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
 impl Times {
     /// Median milliseconds of the passes of a name; 0 where there is none.
     pub(super) fn pass(&self, name: &str) -> f64 {
         self.passes.iter().filter(|(pass, _)| *pass == name).map(|(_, ms)| median(ms)).sum()
+    }
+
+    /// Least milliseconds of the passes of a name; 0 where there is none.
+    pub(super) fn least(&self, name: &str) -> f64 {
+        self.passes.iter().filter(|(pass, _)| *pass == name).map(|(_, ms)| least(ms)).sum()
+    }
+
+    /// Least milliseconds of each pass, together.
+    pub(super) fn least_of_all(&self) -> f64 {
+        self.passes.iter().map(|(_, ms)| least(ms)).sum()
     }
 
     /// Median milliseconds of all passes together.

@@ -14,6 +14,7 @@ mod mip_filters;
 mod multi_view;
 mod passes;
 mod pop_in;
+mod precision;
 mod presets;
 mod radius;
 #[cfg(test)]

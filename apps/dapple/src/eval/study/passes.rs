@@ -3,10 +3,11 @@
 use std::time::Instant;
 
 use anyhow::{Result, bail};
-use dapple_render::gbuffer::{GBuffer, GuardBand, Screen};
+use dapple_render::gbuffer::GuardBand;
 use serde::Deserialize;
 
-use super::{Findings, Moment, Study, StudyTable, Subject, column, row, size_of};
+use super::medians::{Seen, medians};
+use super::{Findings, Study, StudyTable, Subject, column, row, size_of};
 use crate::args::Size;
 use crate::eval::stage::Stage;
 use crate::screen_space::{Effort, ScreenSpace};
@@ -24,37 +25,6 @@ impl Default for Passes {
     fn default() -> Self {
         Passes { sizes: Vec::new(), repeats: 3 }
     }
-}
-
-/// Milliseconds of each pass of a method, in order; the best of some.
-fn times_ms(
-    subject: &Subject<'_>,
-    (moment, gbuffer, screen): (&Moment, &GBuffer, &Screen),
-    method: ScreenSpace,
-    effort: Effort,
-    repeats: u32,
-) -> Result<Vec<(&'static str, f64)>> {
-    let sight = subject.sight(moment, gbuffer)?;
-    let mut best: Vec<(&'static str, f64)> = Vec::new();
-    for repeat in 0..repeats.max(1) {
-        let mut number = 0;
-        let mut last = Instant::now();
-        method.on_screen(screen, &sight, effort, &mut |pass| {
-            let ms = 1e3 * last.elapsed().as_secs_f64();
-            if repeat == 0 {
-                best.push((pass, ms));
-            } else if let Some(best) = best.get_mut(number) {
-                best.1 = best.1.min(ms);
-            }
-            number += 1;
-            last = Instant::now();
-        })?;
-    }
-    Ok(best)
-}
-
-fn of(times: &[(&str, f64)], pass: &str) -> f64 {
-    times.iter().filter(|(name, _)| *name == pass).map(|(_, ms)| ms).sum()
 }
 
 impl Study for Passes {
@@ -81,6 +51,7 @@ impl Study for Passes {
         let moments = subject.moments()?;
         let moment = &moments[moments.len() / 2];
         let methods = subject.methods()?;
+        let quiet = Subject { progress: &|_| (), ..*subject };
         let mut by_size = StudyTable {
             title: "SAO by size of the picture".to_owned(),
             columns: vec![
@@ -99,30 +70,27 @@ impl Study for Passes {
         let mut by_method = Vec::new();
         for (number, &size) in sizes.iter().enumerate() {
             let band = GuardBand::of_height(effort.guard_band, size[1])?;
-            let camera = band.camera(&moment.camera, size[1]);
-            let (gbuffer, screen) = subject.look(moment, size, band)?;
-            let z0_ms = (0..self.repeats.max(1)).map(|_| {
+            let seen = Seen::new(&quiet, moment, size, effort.guard_band)?;
+            let z0_ms = (0..self.repeats).map(|_| {
                 let start = Instant::now();
-                std::hint::black_box(gbuffer.distances_m(&camera));
+                std::hint::black_box(seen.distances_m());
                 1e3 * start.elapsed().as_secs_f64()
             });
             let z0_ms = z0_ms.fold(f64::INFINITY, f64::min);
-            // Methods that draw more than the G-buffer draw it for the same camera.
-            let wide = Moment { pose: moment.pose.clone(), camera };
-            let seen = (&wide, &gbuffer, &screen);
             let sao_effort = Effort { half_resolution: Some(false), ..effort };
-            let times = times_ms(subject, seen, ScreenSpace::Sao, sao_effort, self.repeats)?;
-            let passes = ["levels", "samples", "quads", "bilateral"].map(|pass| of(&times, pass));
+            let times = medians(&quiet, &seen, &[(ScreenSpace::Sao, sao_effort)], self.repeats)?;
+            let passes = ["levels", "samples", "quads", "bilateral"]
+                .map(|pass| times.iter().map(|times| times.least(pass)).sum::<f64>());
             let net = z0_ms + passes.iter().sum::<f64>();
             let visible = f64::from(size[0]) * f64::from(size[1]);
-            let values = [f64::from(band.pixels()), screen.distances_m().len() as f64, z0_ms]
+            let values = [f64::from(band.pixels()), seen.samples() as f64, z0_ms]
                 .into_iter()
                 .chain(passes)
                 .chain([net, 1e6 * net / visible]);
             by_size.rows.push(row(format!("{} × {}", size[0], size[1]), values));
             // One table of all methods, of a size in the middle: the paper's 1080 lines.
             if number == (sizes.len() - 1) / 2 {
-                by_method.push(self.all_methods(subject, seen, &methods, size)?);
+                by_method.push(self.all_methods(&quiet, &seen, &methods, size)?);
             }
             (subject.progress)((number + 1) as f64 / sizes.len() as f64);
         }
@@ -146,7 +114,7 @@ impl Passes {
     fn all_methods(
         &self,
         subject: &Subject<'_>,
-        seen: (&Moment, &GBuffer, &Screen),
+        seen: &Seen,
         methods: &[ScreenSpace],
         size: [u32; 2],
     ) -> Result<StudyTable> {
@@ -165,27 +133,27 @@ impl Passes {
             ],
             rows: Vec::new(),
         };
-        for &method in methods {
-            let run = |half| {
-                let effort = Effort { half_resolution: Some(half), ..effort };
-                times_ms(subject, seen, method, effort, self.repeats)
-            };
-            let (full, half) = (run(false)?, run(true)?);
-            let net = |times: &[(&str, f64)]| times.iter().map(|(_, ms)| ms).sum::<f64>();
-            let (samples, half_samples) = (of(&full, "samples"), of(&half, "samples"));
-            let sum = |passes: &[&str]| passes.iter().map(|pass| of(&full, pass)).sum::<f64>();
-            let levels = of(&full, "levels");
-            let hidden = sum(&["map", "second map", "layers"]);
-            let rest = net(&half) - half_samples;
+        let runs: Vec<(ScreenSpace, Effort)> = methods
+            .iter()
+            .flat_map(|method| {
+                [false, true].map(|half| (*method, Effort { half_resolution: Some(half), ..effort }))
+            })
+            .collect();
+        let times = medians(subject, seen, &runs, self.repeats)?;
+        for (method, times) in methods.iter().zip(times.chunks_exact(2)) {
+            let (full, half) = (&times[0], &times[1]);
+            let sum = |passes: &[&str]| passes.iter().map(|pass| full.least(pass)).sum::<f64>();
+            let seen_or_none = |ms: f64| if ms > 0.0 { ms } else { f64::NAN };
+            let half_samples = half.least("samples");
             let values = [
-                if levels > 0.0 { levels } else { f64::NAN },
-                if hidden > 0.0 { hidden } else { f64::NAN },
-                samples,
+                seen_or_none(full.least("levels")),
+                seen_or_none(sum(&["map", "second map", "layers"])),
+                full.least("samples"),
                 sum(&["blur", "quads", "bilateral"]),
-                net(&full),
+                full.least_of_all(),
                 half_samples,
-                rest,
-                net(&half),
+                half.least_of_all() - half_samples,
+                half.least_of_all(),
             ];
             table.rows.push(row(method.name(), values));
         }

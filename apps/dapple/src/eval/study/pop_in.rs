@@ -242,9 +242,9 @@ impl Study for PopIn {
                 column("mean", "", 5),
                 column("largest", "", 3),
                 column("off the truth's: mean", "", 5),
-                column("1 of 1000 above", "", 4),
-                column("largest", "", 3),
-                column(&format!("above {POP}, of 1000"), "", 2),
+                column("off: 1 of 1000 above", "", 4),
+                column("off: largest", "", 3),
+                column(&format!("off: above {POP}, of 1000"), "", 2),
             ],
             rows: names.iter().zip(&found).map(|(name, found)| row(name, found.values())).collect(),
         };

@@ -1,10 +1,10 @@
 //! How exact distances and normals from a depth buffer are, by its format and the far plane: [McGuire2012] figures 3 and 4.
 
 use anyhow::{Result, bail};
-use dapple_render::sao::precision::{DepthFormat, Deviation, Pipeline, deviation};
 use rayon::prelude::*;
 use serde::Deserialize;
 
+use super::precision::{DepthFormat, Deviation, Pipeline, deviation};
 use super::{Findings, Study, StudyPlot, StudyTable, Subject, axis, column, line, row};
 use crate::eval::stage::Stage;
 

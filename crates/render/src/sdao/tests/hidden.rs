@@ -35,9 +35,9 @@ fn beside_the_box(stage: &Stage, gbuffer: &GBuffer, values: &[f32]) -> f32 {
 }
 
 /// What a lookup makes of a screen, by each of the methods.
-type Method = fn(&Screen, &Lookup<'_>) -> Vec<f32>;
+pub(super) type Method = fn(&Screen, &Lookup<'_>) -> Vec<f32>;
 
-const METHODS: [(&str, Method); 3] = [
+pub(super) const METHODS: [(&str, Method); 3] = [
     ("ssao", |screen, lookup| {
         ssao::estimate_visibility_with(screen, &SsaoParams::default(), lookup).unwrap()
     }),
@@ -74,7 +74,7 @@ fn a_hidden_occluder_is_found_the_oftener_the_more_samples_there_are() {
 }
 
 /// By a stochastic map of so many samples, or, for none, by all layers.
-fn estimate(method: Method, samples: u32) -> impl Fn(&Shot<'_>) -> Vec<f32> + Sync {
+pub(super) fn estimate(method: Method, samples: u32) -> impl Fn(&Shot<'_>) -> Vec<f32> + Sync {
     move |shot| {
         let Shot { stage: Stage { scene, pose }, camera, gbuffer, screen } = shot;
         if samples == 0 {

@@ -1,5 +1,6 @@
 //! The map has the paper's statistics; hidden occluders are found; methods keep the rules of screen-space methods.
 
+mod failures;
 mod hidden;
 mod two_cameras;
 

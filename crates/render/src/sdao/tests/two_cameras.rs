@@ -71,6 +71,20 @@ fn the_second_camera_takes_in_all_that_the_first_one_sees() {
 }
 
 #[test]
+fn a_second_picture_may_have_more_samples_than_pictures_have_pixels() {
+    let stage = still_life();
+    let projection = Projection::Orthographic { half_height: 0.001, near: -3.0, far: 20.0 };
+    let camera = PosedCamera { projection, ..look(Vec3::new(2.0, 0.3, 4.0), Vec3::new(0.9, 0.3, 0.6)) };
+    for map in [MapParams::default(), MapParams::paper(1)] {
+        let draw = |size| {
+            SideView::draw(&stage.scene, &stage.pose, &camera, size, &SideParams::default(), &map).map(|_| ())
+        };
+        draw([16_386, 3]).unwrap();
+        assert!(matches!(draw([1 << 20, 1]), Err(RenderError::Size { .. })));
+    }
+}
+
+#[test]
 fn wrong_second_cameras_are_refused() {
     let camera = look(Vec3::new(2.0, 2.5, 4.0), Vec3::ZERO);
     let good = SideParams::default();

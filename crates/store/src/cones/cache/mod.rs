@@ -69,6 +69,11 @@ impl EntryId {
         EntryId((slot * BLOCK_TEXELS + texel) as u32)
     }
 
+    /// Its number: small, and its own among all entries of the cache.
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+
     fn slot(self) -> usize {
         self.0 as usize / BLOCK_TEXELS
     }

@@ -36,6 +36,9 @@ function rowHint(row) {
   ];
 }
 
+/** Of more levels than this bands would hide each other: only the one under the pointer has one. */
+const MOST_BANDS = 4;
+
 function drawQuality(plot, pen, { lines, on, off, labels, roomy, near, metric, nothing }) {
   const { left, top, width, height } = plot.bbox;
   const scale = devicePixelRatio;
@@ -58,7 +61,7 @@ function drawQuality(plot, pen, { lines, on, off, labels, roomy, near, metric, n
   }
   for (const level of on) {
     pen.strokeStyle = colorOf(level.row.method);
-    if (level.ci95) {
+    if (level.ci95 && (on.length <= MOST_BANDS || near?.point === level)) {
       pen.globalAlpha = 0.1;
       pen.fillStyle = pen.strokeStyle;
       pen.fillRect(left, y(level.y + level.ci95), width, y(level.y - level.ci95) - y(level.y + level.ci95));

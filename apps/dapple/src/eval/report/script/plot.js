@@ -123,8 +123,8 @@ function writeClear(pen, words, x, y, color) {
 function keepApart(labels, lineHeight, top, bottom) {
   const overlap = (a, b) => a.x < b.x + b.width && b.x < a.x + a.width && Math.abs(a.y - b.y) < lineHeight;
   const sorted = [...labels].sort((a, b) => a.y - b.y);
-  // A few rounds settle what one page can hold.
-  for (let round = 0; round < 12; round += 1) {
+  // So many rounds settle some twenty labels on a heap; most heaps take a few.
+  for (let round = 0; round < 200; round += 1) {
     let moved = false;
     for (let i = 1; i < sorted.length; i += 1) {
       for (let j = 0; j < i; j += 1) {

@@ -142,8 +142,10 @@ function qualityPlot(place, caseIndex, small) {
     },
     cursor: { x: false, y: false },
   };
+  // As high as the names of levels are on each other.
+  const names = 17 * on.length + 50;
   const plot = plotIn(place, options, values, (width) =>
-    Math.min(small ? 320 : 460, Math.max(small ? 220 : 260, width * 0.5)),
+    Math.max(names, Math.min(small ? 320 : 460, Math.max(small ? 220 : 260, width * 0.5))),
   );
   plot.over.addEventListener("mouseleave", () => {
     near = null;
@@ -237,7 +239,7 @@ function drawQualitySection() {
   }
   if (equal.length) notes.push(`Not drawn, because equal to the truth: ${equal.join("; ")}.`);
   if (cases.some((one) => one.rows.some((row) => row.figures[metric.key]?.[1])))
-    notes.push("Bars and bands are 95 % intervals.");
+    notes.push("Bars and bands are 95 % intervals; of many levels only the one under the pointer has a band.");
   document.getElementById("quality-note").textContent = notes.join(" ");
 }
 
