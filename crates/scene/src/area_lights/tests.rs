@@ -181,6 +181,13 @@ fn picks_differ_in_noise_alone() {
     let mut chooser = Chooser::new(Pick::Fluence);
     chooser.aim(&lights, Vec3::ZERO, Vec3::Y);
     assert_eq!(chooser.probability(&lights, 3), 0.0);
+    // A sample is a pick and a place on what was picked.
+    for u in cube(500) {
+        let (light, probability, rest) = chooser.pick(&lights, u[0]).unwrap();
+        let place = lights.sample_light(light, Vec3::ZERO, [rest, u[1], u[2]]);
+        let place = place.map(|s| LightSample { density_per_sr: s.density_per_sr * probability, ..s });
+        assert_eq!(place, lights.sample(&chooser, Vec3::ZERO, u));
+    }
 }
 
 #[test]
