@@ -68,10 +68,15 @@ impl LightSample {
     /// A vector along which a shadow ray has to be free, in lengths of it: as far as the light, but for a little, so that the light
     /// does not shade itself.
     pub fn reach(&self) -> Vec3 {
-        const SHORTER: f32 = 1.0 - 1.0 / 2048.0;
-        const FAR_M: f32 = 1e6;
-        self.to_light_world * (self.distance_m.min(FAR_M) * SHORTER)
+        reach(self.to_light_world, self.distance_m)
     }
+}
+
+/// A vector along which a ray has to be free that shall see a light so far away: [`LightSample::reach`].
+pub fn reach(to_light_world: Vec3, distance_m: f32) -> Vec3 {
+    const SHORTER: f32 = 1.0 - 1.0 / 2048.0;
+    const FAR_M: f32 = 1e6;
+    to_light_world * (distance_m.min(FAR_M) * SHORTER)
 }
 
 /// Luminance of linear RGB with the primaries of sRGB (ITU-R BT.709).
@@ -173,6 +178,18 @@ impl<'a> AreaLights<'a> {
                 _ => true,
             })
             .collect()
+    }
+
+    /// Distance along a ray (unit direction) to the nearest light that shines towards its start, infinite for the environment; `None` if it
+    /// meets none. Whether something stands before it is not asked.
+    pub fn hit(&self, from_world: Vec3, direction_world: Vec3) -> Option<f32> {
+        let surfaces = self.lights.iter().filter(|l| l.radiance != Vec3::ZERO);
+        let nearest =
+            surfaces.filter_map(|l| l.shape.hit(from_world, direction_world, l.two_sided)).reduce(f32::min);
+        nearest.or_else(|| {
+            let (environment, ..) = self.environment?;
+            (environment.radiance(direction_world) != Vec3::ZERO).then_some(f32::INFINITY)
+        })
     }
 
     /// A place on a light, seen from `position_world`; `None` if the chosen place cannot be seen from there whatever stands between

@@ -281,6 +281,54 @@ impl Shape {
         }
     }
 
+    /// Distance along a ray (unit direction) to where it first meets the side that shines.
+    pub(super) fn hit(&self, from: Vec3, direction: Vec3, two_sided: bool) -> Option<f32> {
+        let in_front = |t: f32| (t > 0.0 && t.is_finite()).then_some(t);
+        let plane = |center: Vec3, normal: Vec3| {
+            let cosine = -normal.dot(direction);
+            if cosine > 0.0 || two_sided { in_front(-normal.dot(center - from) / cosine) } else { None }
+        };
+        match self {
+            Shape::Nothing => None,
+            Shape::Sphere { center, radius } => {
+                let offset = *center - from;
+                let (along, r2) = (offset.dot(direction), radius * radius);
+                let aside2 = (offset - direction * along).length_squared();
+                (offset.length_squared() > r2 && aside2 <= r2)
+                    .then(|| along - (r2 - aside2).sqrt())
+                    .and_then(in_front)
+            }
+            Shape::Disc { center, normal, radius } => plane(*center, *normal)
+                .filter(|t| (from + direction * *t).distance_squared(*center) <= radius * radius),
+            Shape::Rectangle { center, half: [u, v], normal } => plane(*center, *normal).filter(|t| {
+                let at = from + direction * *t - *center;
+                at.dot(*u).abs() <= u.length_squared() && at.dot(*v).abs() <= v.length_squared()
+            }),
+            Shape::Triangles(triangles) => {
+                let (center, radius) = triangles.ball;
+                let offset = center - from;
+                let along = offset.dot(direction);
+                if (offset - direction * along).length_squared() > radius * radius {
+                    return None;
+                }
+                let hits = triangles.corners.iter().filter_map(|[a, b, c]| {
+                    let (e1, e2) = (*b - *a, *c - *a);
+                    let p = direction.cross(e2);
+                    let det = e1.dot(p);
+                    if det == 0.0 || (det < 0.0 && !two_sided) {
+                        return None;
+                    }
+                    let s = from - *a;
+                    let u = s.dot(p) / det;
+                    let q = s.cross(e1);
+                    let v = direction.dot(q) / det;
+                    (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| e2.dot(q) / det).and_then(in_front)
+                });
+                hits.reduce(f32::min)
+            }
+        }
+    }
+
     pub(super) fn sample(&self, from: Vec3, two_sided: bool, u: [f32; 3]) -> Option<Place> {
         match self {
             Shape::Nothing => None,

@@ -181,6 +181,13 @@ fn picks_differ_in_noise_alone() {
     let mut chooser = Chooser::new(Pick::Fluence);
     chooser.aim(&lights, Vec3::ZERO, Vec3::Y);
     assert_eq!(chooser.probability(&lights, 3), 0.0);
+    // A sample is a pick and a place on what was picked.
+    for u in cube(500) {
+        let (light, probability, rest) = chooser.pick(&lights, u[0]).unwrap();
+        let place = lights.sample_light(light, Vec3::ZERO, [rest, u[1], u[2]]);
+        let place = place.map(|s| LightSample { density_per_sr: s.density_per_sr * probability, ..s });
+        assert_eq!(place, lights.sample(&chooser, Vec3::ZERO, u));
+    }
 }
 
 #[test]
@@ -210,6 +217,44 @@ fn an_estimate_is_never_zero_where_light_arrives() {
             }
         }
     }
+}
+
+#[test]
+fn rays_meet_lights_where_samples_lie_on_them() {
+    for emitter in EmitterShape::NAMES.map(|(_, shape)| shape) {
+        for two_sided in [false, true] {
+            let mut stage = Stage::new();
+            let flat = matches!(emitter, EmitterShape::Disc | EmitterShape::Rectangle);
+            let mesh = if flat { square() } else { octahedron() };
+            let world =
+                Affine3A::from_translation(Vec3::new(0.4, 2.0, -0.3)) * Affine3A::from_rotation_x(2.0);
+            stage.add(mesh, emitter, Vec3::ONE, world).double_sided = two_sided;
+            let pose = stage.scene.pose(0.0);
+            let lights = AreaLights::new(&stage.scene, &pose);
+            let mut found = 0;
+            for u in cube(300) {
+                let Some(s) = lights.sample_light(0, Vec3::ZERO, u) else { continue };
+                found += 1;
+                let hit = lights.hit(Vec3::ZERO, s.to_light_world);
+                let nearer = hit.is_some_and(|t| t <= s.distance_m * 1.001);
+                // At its rim rounding decides; of a body that is seen through, a nearer side may be met.
+                assert!(
+                    nearer
+                        || s.normal_on_light_world.dot(s.to_light_world) > -0.02
+                        || hit.is_none() && rim(&s),
+                    "{s:?} {hit:?}"
+                );
+                assert_eq!(lights.hit(Vec3::ZERO, -s.to_light_world), None);
+            }
+            assert!(found > 100, "{emitter:?}");
+        }
+    }
+}
+
+/// Whether a sample lies next to an edge of the light of the test above.
+fn rim(s: &LightSample) -> bool {
+    let local = (s.to_light_world * s.distance_m - Vec3::new(0.4, 2.0, -0.3)).abs();
+    local.max_element() > 0.98
 }
 
 #[test]

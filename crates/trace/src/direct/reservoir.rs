@@ -41,7 +41,7 @@ impl Choice {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Reservoir {
     pub(super) choice: Option<Choice>,
-    /// W of \[Bitterli2020\] eq. 6: an unbiased estimate of one over the density that the choice was made with; 0 without one.
+    /// W of \[Bitterli2020\]: an unbiased estimate of one over the density that the choice was made with; 0 without one.
     pub(super) weight: f32,
     /// M: how many candidates it was chosen of, at the most that history may count.
     pub(super) candidates: f32,

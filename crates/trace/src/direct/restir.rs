@@ -21,7 +21,7 @@ const MAX_REUSE: u32 = 32;
 const TEMPORAL: u32 = CHOICE + 1;
 const SPATIAL: u32 = CHOICE + 2;
 
-/// How to reuse choices. Defaults are those of \[Bitterli2020\] sec. 6 but for the sampler, which is the best there is here.
+/// How to reuse choices. Defaults are those of \[Bitterli2020\] but for the sampler, which is the best there is here.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RestirParams {
     /// New candidates a pixel and frame, 1 … [`MAX_SAMPLES`] (brought into that range), default 32.
@@ -277,7 +277,7 @@ impl Pass<'_> {
         combine(&sources, self.params.unbiased, seed, cost)
     }
 
-    /// Whether two places may share: \[Bitterli2020\] sec. 5.
+    /// Whether two places may share: \[Bitterli2020\]'s tests.
     fn similar(&self, here: &ShadingPoint, there: &ShadingPoint) -> bool {
         let [d, e] = [here, there].map(|p| p.position_world.distance(self.view.eye_world));
         here.normal_shading_world.dot(there.normal_shading_world) >= self.params.normal_cosine
@@ -306,7 +306,7 @@ impl Source<'_> {
 
 /// A reservoir for the first of the sources from those of all.
 ///
-/// Biased it is \[Bitterli2020\] algorithm 4. Unbiased it is algorithm 6 with the weights of its sec. 4.3: of a place y that came from source s,
+/// Biased it is \[Bitterli2020\] algorithm 4. Unbiased it is algorithm 6 with the weights of its sec. 4: of a place y that came from source s,
 /// m = p̂ₛ(y) / Σ Mᵢ p̂ᵢ(y), where p̂ of a source that does not see y is 0.
 fn combine(sources: &[Source<'_>], unbiased: bool, seed: u64, cost: &mut DirectCost) -> Held {
     let Some(target) = sources.first() else { return Held::default() };

@@ -2,12 +2,12 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use dapple_scene::area_lights::{AreaLights, Pick};
+use dapple_scene::area_lights::{self, AreaLights, Pick};
 use dapple_scene::glam::Vec3;
 use dapple_store::cones::{BoundingEntry, BoundingParams, ConeCache, Probe, UpdateQueue};
 
 use super::{Changes, EntryPlaces, MAX_SAMPLES, SlcCounts, Source, site_of, take_samples};
-use crate::bvh::{Ray, Tracer, offset_origin};
+use crate::bvh::{Tracer, offset_origin};
 use crate::direct::Sequence;
 use crate::sampling::{hash, unit_interval};
 
@@ -59,7 +59,6 @@ pub fn update_bounding_cones(
 ) -> SlcCounts {
     let rays = AtomicU64::new(0);
     let lights = changes.lights();
-    let shines = Shines::of(lights);
     let PaperParams { pick, sequence, seed, .. } = *params;
     let source = Source { pick, sequence, seed, with_cosine: false };
     let updated = cache.update(queue, |index, texel, entry| {
@@ -73,13 +72,13 @@ pub fn update_bounding_cones(
             take_samples(tracer, lights, place, &source, site, taken..taken + count, &mut samples);
         let mut cycle = entry.update(&samples, count, &params.bounding);
         if params.probes {
-            let origin_world = offset_origin(place.position_world, place.normal_world);
+            let from = offset_origin(place.position_world, place.normal_world);
             let probes: Vec<Probe> = (0..entry.cones().len())
                 .filter_map(|cone| {
                     let turn = unit_interval(hash(seed ^ PROBES, site, taken.wrapping_mul(8) + cone as u32));
                     let direction = entry.probe_direction(cone, turn, &params.bounding)?;
-                    let ray = Ray { origin_world, direction_world: direction, t_max: f32::INFINITY };
-                    let hit = place.normal_world.dot(direction) > 0.0 && shines.meets(tracer, lights, &ray);
+                    let hit =
+                        place.normal_world.dot(direction) > 0.0 && meets(tracer, lights, from, direction);
                     Some(Probe { cone, direction, hit })
                 })
                 .collect();
@@ -95,31 +94,10 @@ pub fn update_bounding_cones(
 /// Keeps probes' random numbers apart from those of samples.
 const PROBES: u64 = 0x70_726f_6265;
 
-/// Which instances are lights.
-struct Shines {
-    of_instance: Vec<bool>,
-}
-
-impl Shines {
-    fn of(lights: &AreaLights<'_>) -> Shines {
-        let mut of_instance = Vec::new();
-        for light in 0..lights.len() {
-            let Some(instance) = lights.instance(light).map(|i| i as usize) else { continue };
-            if lights.power_of(light) > 0.0 {
-                of_instance.resize(of_instance.len().max(instance + 1), false);
-                of_instance[instance] = true;
-            }
-        }
-        Shines { of_instance }
-    }
-
-    /// Whether a ray ends at a light.
-    fn meets(&self, tracer: &Tracer, lights: &AreaLights<'_>, ray: &Ray) -> bool {
-        match tracer.closest_hit(ray) {
-            Some(hit) => {
-                self.of_instance.get(hit.instance as usize).is_some_and(|shines| *shines) && !hit.back_face
-            }
-            None => lights.environment().is_some_and(|sky| sky.radiance(ray.direction_world) != Vec3::ZERO),
-        }
-    }
+/// Whether a ray ends at a light.
+fn meets(tracer: &Tracer, lights: &AreaLights<'_>, from: Vec3, direction: Vec3) -> bool {
+    lights.hit(from, direction).is_some_and(|distance| {
+        let blocked = tracer.occlusion(from, &[area_lights::reach(direction, distance)], 1.0);
+        blocked[0] & 1 == 0
+    })
 }
