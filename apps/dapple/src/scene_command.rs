@@ -12,7 +12,7 @@ use crate::progress::Bar;
 pub(crate) fn run(args: &SceneArgs) -> Result<()> {
     let Some(name) = &args.name else {
         for scene in builtin::BUILTINS {
-            say!("{:10} {}", scene.name, scene.summary);
+            say!("{:13} {}", scene.name, scene.summary);
         }
         return Ok(());
     };

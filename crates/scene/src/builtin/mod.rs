@@ -9,9 +9,13 @@
 mod atrium;
 pub mod builder;
 mod cornell;
+mod emitters;
+mod hangar;
+mod joinery;
 mod kit;
 mod lab;
 mod leaks;
+mod movers;
 pub mod noise;
 mod paint;
 pub mod path;
@@ -19,6 +23,8 @@ pub mod physics;
 mod profile;
 pub mod shapes;
 mod station;
+mod street;
+mod village;
 
 /// A scene that the library can make.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,6 +40,11 @@ pub const BUILTINS: &[Builtin] = &[
     Builtin {
         name: "atrium",
         summary: "A two-storey hall with arcades, stairs, curtains and railings, where boulders roll and spot lights sweep \
+                  (15 s; camera paths path-walk and path-gallery).",
+    },
+    Builtin {
+        name: "atrium-lamps",
+        summary: "The atrium lit by four area lights alone: three globes in the lower arcades and a panel under the skylight \
                   (15 s; camera paths path-walk and path-gallery).",
     },
     Builtin {
@@ -55,6 +66,21 @@ pub const BUILTINS: &[Builtin] = &[
         name: "leaks",
         summary: "A gallery of thin partitions, shelves, sheets of steel, curtains and volumes that touch, on which wrong light \
                   shows (15 s; camera paths path-visit and path-close).",
+    },
+    Builtin {
+        name: "village",
+        summary: "A village of timber houses at night, lit by 51 flames and a moon that is a disc; a windmill turns \
+                  (15 s; camera paths path-lane and path-roofs).",
+    },
+    Builtin {
+        name: "street",
+        summary: "A street of shops and tables, lit by two spheres and a turning cube that move through it past turning wheels and a \
+                  carriage (15 s; camera paths path-walk and path-crane).",
+    },
+    Builtin {
+        name: "hangar",
+        summary: "A hangar with a craft, stores and a crane, lit by 28 drones that fly with a sphere, a ring, a rectangle or a disc of light \
+                  (15 s; camera paths path-aisle and path-roof).",
     },
 ];
 
@@ -98,10 +124,14 @@ pub fn glb(name: &str, detail: f32) -> Result<Vec<u8>, BuiltinError> {
     }
     match name {
         "atrium" => atrium::glb(Detail(detail)),
+        "atrium-lamps" => atrium::lamps(Detail(detail)),
         "station" => station::glb(Detail(detail)),
         "lab" => lab::glb(Detail(detail)),
         "cornell" => cornell::glb(Detail(detail)),
         "leaks" => leaks::glb(Detail(detail)),
+        "street" => street::glb(Detail(detail)),
+        "hangar" => hangar::glb(Detail(detail)),
+        "village" => village::glb(Detail(detail)),
         _ => Err(BuiltinError::Unknown {
             name: name.into(),
             known: BUILTINS.iter().map(|b| b.name).collect::<Vec<_>>().join(", "),

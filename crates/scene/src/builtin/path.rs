@@ -30,15 +30,20 @@ pub fn spline(control: &[Vec3], t: f32) -> Vec3 {
 pub fn even_spline(control: &[Vec3], frames: u32) -> Vec<Vec3> {
     let fine = 16 * frames.max(64);
     let points: Vec<Vec3> = (0..=fine).map(|i| spline(control, i as f32 / fine as f32)).collect();
+    even(&points, frames)
+}
+
+/// `steps + 1` points at equal distances along a line of points.
+fn even(points: &[Vec3], steps: u32) -> Vec<Vec3> {
     let mut way = vec![0.0_f64];
     for pair in points.windows(2) {
         way.push(way[way.len() - 1] + f64::from(pair[0].distance(pair[1])));
     }
     let total = way[way.len() - 1];
     let mut segment = 0;
-    (0..=frames)
+    (0..=steps)
         .map(|i| {
-            let goal = total * f64::from(i) / f64::from(frames.max(1));
+            let goal = total * f64::from(i) / f64::from(steps.max(1));
             while segment + 2 < way.len() && way[segment + 1] < goal {
                 segment += 1;
             }
@@ -46,6 +51,28 @@ pub fn even_spline(control: &[Vec3], frames: u32) -> Vec<Vec3> {
             points[segment].lerp(points[segment + 1], (((goal - way[segment]) / step) as f32).clamp(0.0, 1.0))
         })
         .collect()
+}
+
+/// `steps + 1` points at equal distances on the closed uniform cubic B-spline of control points; the last is the first.
+pub fn even_loop(control: &[Vec3], steps: u32) -> Vec<Vec3> {
+    let count = control.len().max(1);
+    let at = |i: usize| control.get(i % count).copied().unwrap_or(Vec3::ZERO);
+    let fine = 16 * steps.max(64);
+    let points: Vec<Vec3> = (0..=fine)
+        .map(|k| {
+            let s = (k % fine) as f32 * count as f32 / fine as f32;
+            let (i, f) = (s as usize, s - libm::floorf(s));
+            let (f2, f3) = (f * f, f * f * f);
+            let weights = [
+                (1.0 - 3.0 * f + 3.0 * f2 - f3) / 6.0,
+                (4.0 - 6.0 * f2 + 3.0 * f3) / 6.0,
+                (1.0 + 3.0 * f + 3.0 * f2 - 3.0 * f3) / 6.0,
+                f3 / 6.0,
+            ];
+            (0..4).fold(Vec3::ZERO, |p, j| p + at(i + j) * weights[j])
+        })
+        .collect();
+    even(&points, steps)
 }
 
 /// Poses of a camera that moves along `eye` at constant speed and looks at a point that moves along `target` evenly in time:

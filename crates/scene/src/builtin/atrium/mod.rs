@@ -1,5 +1,6 @@
 //! The atrium: a two-storey hall with arcades, stairs and a gallery, in which boulders roll.
 
+mod lamps;
 mod motion;
 mod parts;
 mod plan;
@@ -43,15 +44,36 @@ struct Palette {
     iron: MaterialId,
 }
 
+/// What lights the hall.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Lit {
+    /// Sun, lanterns and spot lights.
+    Punctual,
+    /// Globes and a panel that emit from their area; nothing else does.
+    Areas,
+}
+
 /// Makes the scene.
 pub(super) fn glb(detail: Detail) -> Result<Vec<u8>, BuiltinError> {
+    make(detail, Lit::Punctual)
+}
+
+/// Makes the scene with area lights instead of its punctual ones.
+pub(super) fn lamps(detail: Detail) -> Result<Vec<u8>, BuiltinError> {
+    make(detail, Lit::Areas)
+}
+
+fn make(detail: Detail, lit: Lit) -> Result<Vec<u8>, BuiltinError> {
     let mut b = GlbBuilder::new();
-    let palette = palette(&mut b)?;
+    let palette = palette(&mut b, lit)?;
     build_structure(&mut b, &palette, detail);
     build_furniture(&mut b, &palette, detail);
     build_textiles(&mut b, &palette, detail);
     let animation = b.animation("atrium");
-    light(&mut b, &palette, animation, detail);
+    match lit {
+        Lit::Punctual => light(&mut b, &palette, animation, detail),
+        Lit::Areas => lamps::light(&mut b, &palette, detail),
+    }
     roll_boulders(&mut b, &palette, animation, detail);
     path::place_cameras(
         &mut b,
@@ -62,7 +84,7 @@ pub(super) fn glb(detail: Detail) -> Result<Vec<u8>, BuiltinError> {
     b.finish()
 }
 
-fn palette(b: &mut GlbBuilder) -> Result<Palette, BuiltinError> {
+fn palette(b: &mut GlbBuilder, lit: Lit) -> Result<Palette, BuiltinError> {
     let size = [super::paint::SIZE; 2];
     let floor = b.texture("floor", size, &textures::floor(), false)?;
     let stone = b.texture("stone", size, &textures::stone(), false)?;
@@ -112,12 +134,15 @@ fn palette(b: &mut GlbBuilder) -> Result<Palette, BuiltinError> {
             "lattice",
             &MaterialSpec { alpha_cutoff: Some(0.5), double_sided: true, ..textured(lattice, 0.7) },
         ),
-        glow: b.material(
-            "lantern-glass",
-            &MaterialSpec { emissive: Vec3::new(4.0, 2.6, 1.2), ..MaterialSpec::matt(0.9, 0.8, 0.6, 0.4) },
-        ),
+        glow: b.material("lantern-glass", &lantern_glass(lit)),
         iron: b.material("iron", &metal(0.16, 0.15, 0.15, 0.5)),
     })
+}
+
+/// The lanterns' glass, dark where other lights are the only ones.
+fn lantern_glass(lit: Lit) -> MaterialSpec {
+    let emissive = if lit == Lit::Punctual { Vec3::new(4.0, 2.6, 1.2) } else { Vec3::ZERO };
+    MaterialSpec { emissive, ..MaterialSpec::matt(0.9, 0.8, 0.6, 0.4) }
 }
 
 /// The point (x, z) at a height.

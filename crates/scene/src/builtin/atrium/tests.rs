@@ -9,6 +9,8 @@ use super::plan::{CEILING, ROOM, solids};
 use crate::builtin::tests::document::{self, point_triangle_distance, read, still_triangles};
 use crate::builtin::{glb, path, physics};
 
+mod lamps;
+
 const DETAIL: f32 = 0.1;
 
 static SMALL: LazyLock<Vec<u8>> = LazyLock::new(|| glb("atrium", DETAIL).expect("the small atrium"));

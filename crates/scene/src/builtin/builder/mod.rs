@@ -18,7 +18,7 @@ use serde_json::value::RawValue;
 use super::BuiltinError;
 use super::shapes::Geometry;
 use binary::{Bounds, flat3, pad};
-pub use spec::{Influences, LightSpec, MaterialSpec, NodeSpec, Track, rotation_y};
+pub use spec::{Emitter, Influences, LightSpec, MaterialSpec, NodeSpec, Track, rotation_y};
 
 /// A material in the document.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -252,13 +252,19 @@ impl GlbBuilder {
 }
 
 fn node_extras(spec: &NodeSpec) -> json::Extras {
-    let text = match (spec.casts, spec.receives) {
-        (true, true) => return None,
-        (false, true) => r#"{"casts":false}"#,
-        (true, false) => r#"{"receives":false}"#,
-        (false, false) => r#"{"casts":false,"receives":false}"#,
-    };
-    RawValue::from_string(text.into()).ok()
+    let mut fields: Vec<String> = Vec::new();
+    for (key, flag) in [("casts", spec.casts), ("receives", spec.receives)] {
+        if !flag {
+            fields.push(format!("\"{key}\":false"));
+        }
+    }
+    if let Some(emitter) = spec.emitter {
+        fields.push(format!("\"light\":\"{}\"", emitter.name()));
+    }
+    match fields.is_empty() {
+        true => None,
+        false => RawValue::from_string(format!("{{{}}}", fields.join(","))).ok(),
+    }
 }
 
 fn id<T>(index: json::Index<T>) -> u32 {

@@ -47,6 +47,28 @@ impl MaterialSpec {
     }
 }
 
+/// The analytic shape that an emitting mesh stands for; the mesh is what cameras see and what casts shadows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Emitter {
+    /// The sphere around the mesh's vertices, about their middle.
+    Sphere,
+    /// A flat disc that emits towards the mesh's front.
+    Disc,
+    /// A flat rectangle along two of the mesh's own axes that emits towards the mesh's front.
+    Rectangle,
+}
+
+impl Emitter {
+    /// Its name in `extras.light`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Emitter::Sphere => "sphere",
+            Emitter::Disc => "disc",
+            Emitter::Rectangle => "rectangle",
+        }
+    }
+}
+
 /// A node to write: where it stands and what it carries. The default is an empty node at the origin of the world.
 #[derive(Clone, Debug)]
 pub struct NodeSpec {
@@ -70,6 +92,8 @@ pub struct NodeSpec {
     pub casts: bool,
     /// Whether the mesh carries computed light; `false` is written as `extras.receives`.
     pub receives: bool,
+    /// What shape the mesh stands for if its material emits; written as `extras.light`. `None`: its triangles emit.
+    pub emitter: Option<Emitter>,
 }
 
 impl Default for NodeSpec {
@@ -85,6 +109,7 @@ impl Default for NodeSpec {
             light: None,
             casts: true,
             receives: true,
+            emitter: None,
         }
     }
 }

@@ -9,7 +9,7 @@ use glam::{Affine3A, Vec2, Vec3};
 
 pub use building::{arcade_wall, ring_slab, ring_slab_faces, stairs};
 pub use loft::{Girth, between, loft, oval};
-pub use organic::{boulder, boulder_points, cloth};
+pub use organic::{ball, boulder, boulder_points, cloth};
 pub use swept::{Frame, arc_frames, circle, lathe, rectangle, sweep, tube};
 
 /// Triangles with unit normals and texture coordinates; all three lists of vertices are equally long.

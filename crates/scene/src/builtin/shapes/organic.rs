@@ -66,6 +66,13 @@ pub fn boulder(level: u32, seed: u32) -> Geometry {
     Geometry { positions, normals, uvs, triangles }
 }
 
+/// A ball of radius 1 about the origin: an icosphere of `20 · 4^level` triangles, its vertices on the sphere. Closed, smooth.
+pub fn ball(level: u32) -> Geometry {
+    let (directions, triangles) = icosphere(level);
+    let uvs = directions.iter().map(|p| Vec2::new(p.x, -p.y)).collect();
+    Geometry { normals: directions.clone(), positions: directions, uvs, triangles }
+}
+
 /// Points on the surface of [`boulder`] at a level, for a hull.
 pub fn boulder_points(level: u32, seed: u32) -> Vec<Vec3> {
     icosphere(level).0.iter().map(|&d| d * boulder_radius(seed, d)).collect()

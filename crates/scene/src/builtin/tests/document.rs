@@ -235,3 +235,108 @@ pub(in crate::builtin) fn assert_cameras_keep_clear(
         assert!(degrees < 90.0, "{name}: turns too fast in frame {frame}");
     }
 }
+
+/// An instance that emits: its node's name, its `extras.light`, its index, and whether it moves.
+pub(in crate::builtin) struct Lamp {
+    pub(in crate::builtin) name: String,
+    pub(in crate::builtin) shape: Option<String>,
+    pub(in crate::builtin) instance: usize,
+    pub(in crate::builtin) moves: bool,
+}
+
+/// All instances whose materials emit, in order. Checks what is promised of their meshes: that all of it emits, that a sphere's vertices
+/// lie on a sphere about their middle, and that discs and rectangles are flat, face −Z of the mesh, and are what they are called.
+pub(in crate::builtin) fn lamps(doc: &Doc, scene: &Scene) -> Vec<Lamp> {
+    let moves = scene.moving_instances();
+    let mut lamps = Vec::new();
+    for (i, instance) in scene.instances.iter().enumerate() {
+        let mesh = &scene.meshes[instance.mesh as usize];
+        let emits =
+            |part: &crate::Part| scene.materials[part.material as usize].emissive_factor.max_element() > 0.0;
+        if !mesh.parts.iter().any(emits) {
+            continue;
+        }
+        let name = scene.nodes[instance.node as usize].name.clone();
+        assert!(mesh.parts.iter().all(emits), "{name}: a part of a light does not emit");
+        let node = doc.gltf.nodes().nth(instance.node as usize).expect("a node");
+        let extras = node.extras().as_ref().map(|e| e.get().to_string()).unwrap_or_default();
+        let extras: serde_json::Value = serde_json::from_str(&extras).unwrap_or_default();
+        let shape = extras.get("light").and_then(|v| v.as_str()).map(str::to_string);
+        let bounds = Aabb::from_points(mesh.positions.iter().copied());
+        let size = bounds.max - bounds.min;
+        let farthest = |middle: Vec3| mesh.positions.iter().map(|p| p.distance(middle)).fold(0.0, f32::max);
+        match shape.as_deref() {
+            Some("sphere") => {
+                let (middle, radius) = (0.5 * (bounds.min + bounds.max), 0.5 * size.max_element());
+                let on = |p: &Vec3| (p.distance(middle) - radius).abs() < 0.01 * radius;
+                assert!(mesh.positions.iter().all(on), "{name} is no sphere");
+            }
+            Some("disc" | "rectangle") => {
+                assert_eq!((bounds.min.z, bounds.max.z), (0.0, 0.0), "{name} is not flat");
+                assert!(mesh.normals.iter().all(|&n| n == Vec3::NEG_Z), "{name} faces elsewhere");
+                let area: f32 = mesh.triangles.iter().fold(0.0, |sum, t| {
+                    let [a, b, c] = t.map(|v| mesh.positions[v as usize]);
+                    let cross = (b - a).cross(c - a);
+                    assert!(cross.z < 0.0, "{name}: a triangle looks back");
+                    sum - 0.5 * cross.z
+                });
+                let whole = match shape.as_deref() {
+                    Some("disc") => std::f32::consts::PI * farthest(Vec3::ZERO) * farthest(Vec3::ZERO),
+                    _ => size.x * size.y,
+                };
+                assert!((area / whole - 1.0).abs() < 0.02, "{name}: {area} m² of {whole}");
+            }
+            other => assert_eq!(other, None, "{name}"),
+        }
+        lamps.push(Lamp { name, shape, instance: i, moves: moves[i] });
+    }
+    lamps
+}
+
+/// Checks that movers, each a ball about its node of a radius, stay clear of each other and of what stands still, by margins in metres,
+/// at `steps` moments; tells the least distances.
+pub(in crate::builtin) fn assert_movers_keep_clear(
+    scene: &Scene,
+    balls: &[(&str, f32)],
+    steps: u32,
+    margin_m: f32,
+) {
+    let moves = scene.moving_instances();
+    let start = scene.pose(0.0);
+    let mut still: Vec<([Vec3; 3], Aabb)> = Vec::new();
+    for (i, instance) in scene.instances.iter().enumerate().filter(|(i, _)| !moves[*i]) {
+        let mesh = &scene.meshes[instance.mesh as usize];
+        let world = start.instances[i].world_from_mesh;
+        still.extend(mesh.triangles.iter().map(|t| {
+            let t = t.map(|v| world.transform_point3(mesh.positions[v as usize]));
+            (t, Aabb::from_points(t))
+        }));
+    }
+    let find = |name: &str| {
+        let node = scene.nodes.iter().position(|n| n.name == name).expect(name) as u32;
+        scene.instances.iter().position(|i| i.node == node).expect(name)
+    };
+    let balls: Vec<(&str, usize, f32)> = balls.iter().map(|&(name, r)| (name, find(name), r)).collect();
+    let (mut from_still, mut from_others) = (f32::INFINITY, f32::INFINITY);
+    for step in 0..steps {
+        let time = f64::from(SECONDS) * f64::from(step) / f64::from(steps);
+        let pose = scene.pose(time);
+        let at = |i: usize| Vec3::from(pose.instances[i].world_from_mesh.translation);
+        for (k, &(name, i, radius)) in balls.iter().enumerate() {
+            let p = at(i);
+            for (t, b) in &still {
+                let reach = from_still + radius;
+                if b.distance_squared(p) < reach * reach {
+                    from_still = from_still.min(point_triangle_distance(p, *t) - radius);
+                    assert!(from_still > margin_m, "{name} meets {t:?} at {time:.2} s: {from_still} m");
+                }
+            }
+            for &(other, j, r) in &balls[..k] {
+                let gap = p.distance(at(j)) - radius - r;
+                from_others = from_others.min(gap);
+                assert!(gap > margin_m, "{name} meets {other} at {time:.2} s: {gap} m");
+            }
+        }
+    }
+    eprintln!("movers: {from_still:.2} m from what stands still, {from_others:.2} m from each other");
+}
