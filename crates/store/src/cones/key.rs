@@ -11,6 +11,9 @@ pub const COARSEST_LEVEL: i8 = 12;
 /// Texels along a side of a block ([Stadlbauer2023] sec. 2.1).
 pub const BLOCK_SIDE: i32 = 8;
 
+/// Its logarithm.
+const BLOCK_BITS: u32 = BLOCK_SIDE.trailing_zeros();
+
 /// Texels of a block.
 pub const BLOCK_TEXELS: usize = 64;
 
@@ -47,13 +50,40 @@ pub struct TexelKey {
 }
 
 impl BlockKey {
+    /// The level `steps` coarser (finer if negative), if both it and this one are levels.
+    fn level_at(self, steps: i32) -> Option<i8> {
+        let levels = i32::from(FINEST_LEVEL)..=i32::from(COARSEST_LEVEL);
+        let (level, other) = (i32::from(self.level), i32::from(self.level) + steps);
+        (levels.contains(&level) && levels.contains(&other)).then_some(other as i8)
+    }
+
+    /// The blocks of another level that hold what texels of this one could begin with: for `steps` > 0 the one that many levels
+    /// coarser, otherwise those so many finer. Empty beyond the coarsest and the finest level.
+    pub(super) fn relatives(self, steps: i8) -> impl Iterator<Item = BlockKey> {
+        let level = self.level_at(i32::from(steps));
+        let (up, down) = (steps.clamp(0, 18), (-steps.max(-18)).max(0));
+        let side = 1i32 << down;
+        let (slabs, first_slab) = match (self.chart & SLABS, down) {
+            (0, _) => (1, 0),
+            (_, 0) => (1, self.slab >> up),
+            (_, down) => (2, self.slab.wrapping_shl(down as u32).wrapping_add((1 << (down - 1)) - 1)),
+        };
+        let [x, y] = [self.x, self.y].map(|v| (v >> up).wrapping_shl(down as u32));
+        level.into_iter().flat_map(move |level| {
+            (0..slabs * side * side).map(move |i| BlockKey {
+                level,
+                slab: first_slab.wrapping_add(i / (side * side)),
+                x: x.wrapping_add(i % side),
+                y: y.wrapping_add(i / side % side),
+                ..self
+            })
+        })
+    }
+
     /// The texel at x, y of the level, in the same chart (and slab) as this block.
     pub(super) fn texel_at(self, x: i32, y: i32) -> TexelKey {
         let texel = (y.rem_euclid(BLOCK_SIDE) * BLOCK_SIDE + x.rem_euclid(BLOCK_SIDE)) as u8;
-        TexelKey {
-            block: BlockKey { x: x.div_euclid(BLOCK_SIDE), y: y.div_euclid(BLOCK_SIDE), ..self },
-            texel,
-        }
+        TexelKey { block: BlockKey { x: x >> BLOCK_BITS, y: y >> BLOCK_BITS, ..self }, texel }
     }
 }
 
@@ -70,10 +100,7 @@ impl TexelKey {
 
     /// The texel of a coarser level (`up` levels, 1 … 18) that holds this one; none beyond the coarsest.
     pub fn coarser(&self, up: u8) -> Option<TexelKey> {
-        let level = self.block.level.checked_add_unsigned(up)?;
-        if level > COARSEST_LEVEL {
-            return None;
-        }
+        let level = self.block.level_at(i32::from(up))?;
         let [x, y] = self.xy();
         let block = BlockKey { level, slab: self.block.slab >> up, ..self.block };
         Some(block.texel_at(x >> up, y >> up))
@@ -81,7 +108,9 @@ impl TexelKey {
 
     /// The texels of a finer level (`down` levels, 1 … 18) about this one's centre: 4, in slabs 8.
     pub fn finer(&self, down: u8) -> impl Iterator<Item = TexelKey> + use<> {
-        let level = self.block.level.checked_sub_unsigned(down).filter(|&level| level >= FINEST_LEVEL);
+        let level = self.block.level_at(-i32::from(down)).filter(|_| down > 0);
+        // Not used where there is no level.
+        let down = down.clamp(1, 18);
         let centre = |v: i32| {
             let v = i64::from(v).saturating_mul(1 << down) + (1 << (down - 1));
             v.clamp(i64::from(i32::MIN) + 1, i64::from(i32::MAX)) as i32
@@ -113,6 +142,13 @@ pub fn level_of(footprint_m: f32, texel_m: f32, bias: f32) -> Option<i8> {
     let exponent = (bits >> 23) as i32 - 127;
     let up = i32::from(bits & 0x007f_ffff > std::f32::consts::SQRT_2.to_bits() & 0x007f_ffff);
     Some((exponent + up).clamp(i32::from(FINEST_LEVEL), i32::from(COARSEST_LEVEL)) as i8)
+}
+
+/// The largest integer not above, at the limits of 32 bits where there is none; 0 for what is no number. A good deal quicker
+/// than `f32::floor` where that is a call.
+pub(super) fn floor(v: f32) -> i32 {
+    let towards_zero = v as i32;
+    towards_zero.saturating_sub(i32::from(v < towards_zero as f32))
 }
 
 /// Edge of a level's texel in texels of the chart.
@@ -184,11 +220,22 @@ mod tests {
             let mut count = 0;
             for finer in texel.finer(steps) {
                 prop_assert_eq!(finer.coarser(steps), Some(texel));
+                prop_assert!(texel.block.relatives(-(steps as i8)).any(|block| block == finer.block));
                 count += 1;
             }
             let expected = if level - (steps as i8) < FINEST_LEVEL { 0 } else if slabs { 8 } else { 4 };
             prop_assert_eq!(count, expected);
+            let coarser: Vec<_> = texel.block.relatives(steps as i8).collect();
+            prop_assert_eq!(coarser, [texel.coarser(steps).unwrap().block]);
         }
+    }
+
+    #[test]
+    fn floors() {
+        for v in [0.0f32, -0.0, 0.5, -0.5, 1.0, -1.0, -1.5, 8_388_607.5, -8_388_607.5, 2e9, -2e9] {
+            assert_eq!(f64::from(floor(v)), f64::from(v).floor(), "{v}");
+        }
+        assert_eq!([f32::NAN, 1e20, -1e20].map(floor), [0, i32::MAX, i32::MIN]);
     }
 
     #[test]
@@ -204,5 +251,11 @@ mod tests {
             BlockKey { instance: 0, chart: 0, level: 12, slab: 0, x: 0, y: 0 }.texel_at(i32::MAX, i32::MIN);
         assert_eq!((far.coarser(1), far.xy()), (None, [i32::MAX, i32::MIN]));
         assert_eq!(far.finer(2).count(), 4);
+        // Any numbers are a key, if not one of a texel.
+        let odd = TexelKey { block: BlockKey { level: -128, ..far.block }, texel: 255 };
+        assert_eq!(
+            (odd.coarser(130), odd.coarser(255), odd.finer(255).count(), far.finer(0).count()),
+            (None, None, 0, 0)
+        );
     }
 }

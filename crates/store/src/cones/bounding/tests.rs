@@ -168,8 +168,9 @@ fn totals_are_the_fluence_of_a_sphere() {
         }
         sum += entry.energy().y / 100.0;
         let widest = entry.cones().iter().map(|c| c.angle).fold(0.0, f32::max);
-        // A little wider than the light: what encloses a cone and a sample, one after the other, is not the least.
-        assert!(widest < 1.1 * libm::asinf(0.25), "{widest}");
+        // Wider than the light at times: what encloses a cone and a sample, one after the other, is not the least that
+        // holds all samples. Once the light is covered nothing grows any more.
+        assert!(widest < 1.5 * libm::asinf(0.25), "{widest}");
     }
     assert!((sum / exact - 1.0).abs() < 0.02, "{sum} for {exact}");
 }

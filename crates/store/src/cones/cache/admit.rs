@@ -107,6 +107,7 @@ impl<E: ConeEntry> ConeCache<E> {
         let head = Head {
             key: *key,
             known: 0,
+            sampled: 0,
             wanted: 0,
             moved: 0,
             last_wanted: self.frame,
@@ -149,14 +150,20 @@ impl<E: ConeEntry> ConeCache<E> {
     fn enqueue(&mut self, slot: usize, queue: &mut UpdateQueue) {
         let Head { key, known, wanted, moved, .. } = self.heads[slot];
         self.heads[slot].first_queued = queue.texels.len() as u32;
+        // One look for the whole block is cheaper than many for each texel.
+        let levels = 1..=self.params.reuse_levels as i8;
+        let can_reuse = wanted & !known != 0
+            && levels.flat_map(|k| [-k, k]).any(|k| key.relatives(k).any(|block| self.has_samples(&block)));
         for texel in bits(wanted) {
             let is_new = known >> texel & 1 == 0;
             if is_new {
-                let begin = self.begin_with(&TexelKey { block: key, texel: texel as u8 });
+                let texel_key = TexelKey { block: key, texel: texel as u8 };
+                let begin = if can_reuse { self.begin_with(&texel_key) } else { None };
                 queue.reused += u32::from(begin.is_some());
                 let body = &mut self.bodies[slot];
                 body.entries[texel] = begin.unwrap_or_default();
                 body.updated[texel] = 0;
+                self.heads[slot].note_samples(texel, &body.entries[texel]);
             }
             let body = &self.bodies[slot];
             let age = match body.updated[texel] {
@@ -192,6 +199,11 @@ impl<E: ConeEntry> ConeCache<E> {
             entry.cut_confidence(self.params.reuse_samples);
             entry
         })
+    }
+
+    /// Whether a block exists and an entry of it has samples.
+    fn has_samples(&self, key: &BlockKey) -> bool {
+        self.slot_of.get(key).is_some_and(|&slot| self.heads[slot as usize].sampled != 0)
     }
 
     /// The entry of a texel if it has samples of its own.

@@ -91,6 +91,8 @@ struct Head {
     known: u64,
     /// Texels wanted in this frame.
     wanted: u64,
+    /// Texels whose entry has samples: what a reader asks first.
+    sampled: u64,
     /// Texels whose place became another in this frame.
     moved: u64,
     last_wanted: u32,
@@ -98,6 +100,13 @@ struct Head {
     first_queued: u32,
     /// Whether a key leads here; the others wait to be used again.
     is_used: bool,
+}
+
+impl Head {
+    /// Whether a texel's entry has samples, to be known before the entry is looked at.
+    fn note_samples(&mut self, texel: usize, entry: &impl ConeEntry) {
+        self.sampled = self.sampled & !(1 << texel) | u64::from(entry.confidence() > 0) << texel;
+    }
 }
 
 /// A block's texels.
@@ -199,12 +208,13 @@ impl<E: ConeEntry> ConeCache<E> {
             return Err(ConeError::BadParameter { name, value: f64::from(queue.frame), rule });
         }
         let frame = self.frame;
-        let done = self.heads.par_iter().zip(&mut self.bodies).map(|(head, body)| {
+        let done = self.heads.par_iter_mut().zip(&mut self.bodies).map(|(head, body)| {
             let mut done = 0;
             for (index, texel) in (head.first_queued as usize..).zip(bits(head.wanted)) {
                 let Some(queued) = queue.texels.get(index) else { break };
                 if update(index, queued, &mut body.entries[texel]) {
                     body.updated[texel] = frame;
+                    head.note_samples(texel, &body.entries[texel]);
                     done += 1;
                 }
             }
@@ -219,10 +229,16 @@ impl<E: ConeEntry> ConeCache<E> {
         (head.known >> id.texel() & 1 == 1).then(|| &self.bodies[id.slot()].entries[id.texel()])
     }
 
-    /// An entry, to be changed, if it has a place.
-    pub fn entry_mut(&mut self, id: EntryId) -> Option<&mut E> {
-        let head = self.heads.get(id.slot())?;
-        (head.known >> id.texel() & 1 == 1).then(|| &mut self.bodies[id.slot()].entries[id.texel()])
+    /// Changes an entry outside the queue, if it has a place; says whether it has.
+    pub fn change(&mut self, id: EntryId, change: impl FnOnce(&mut E)) -> bool {
+        let Some(head) = self.heads.get_mut(id.slot()).filter(|head| head.known >> id.texel() & 1 == 1)
+        else {
+            return false;
+        };
+        let entry = &mut self.bodies[id.slot()].entries[id.texel()];
+        change(entry);
+        head.note_samples(id.texel(), entry);
+        true
     }
 
     /// Instance and place of an entry.
@@ -241,7 +257,8 @@ impl<E: ConeEntry> ConeCache<E> {
     /// The entry of a texel, if it has a place.
     pub fn find(&self, key: &TexelKey) -> Option<EntryId> {
         let slot = *self.slot_of.get(&key.block)? as usize;
-        (self.heads[slot].known >> key.texel & 1 == 1).then(|| EntryId::new(slot, usize::from(key.texel)))
+        let known = self.heads[slot].known.checked_shr(u32::from(key.texel)).unwrap_or(0);
+        (known & 1 == 1).then(|| EntryId::new(slot, usize::from(key.texel)))
     }
 
     /// All entries that have a place, in an order that depends on what was admitted alone.
@@ -250,7 +267,7 @@ impl<E: ConeEntry> ConeCache<E> {
         used.flat_map(|(slot, head)| bits(head.known).map(move |texel| EntryId::new(slot, texel)))
     }
 
-    /// Removes the blocks of instances that are not to be kept. This ends the frame's queue.
+    /// Removes the blocks of instances that are not to be kept. What the frame's queue has of them is gone.
     pub fn retain_instances(&mut self, keep: impl Fn(u32) -> bool) {
         for slot in 0..self.heads.len() {
             if self.heads[slot].is_used && !keep(self.heads[slot].key.instance) {
@@ -263,7 +280,7 @@ impl<E: ConeEntry> ConeCache<E> {
     fn release(&mut self, slot: usize) {
         let head = &mut self.heads[slot];
         self.slot_of.remove(&head.key);
-        (head.is_used, head.known, head.wanted, head.moved) = (false, 0, 0, 0);
+        (head.is_used, head.known, head.sampled, head.wanted, head.moved) = (false, 0, 0, 0, 0);
         self.free.push(slot as u32);
     }
 }

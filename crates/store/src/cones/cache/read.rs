@@ -42,12 +42,13 @@ pub struct Reader<'a, E> {
     look_up: LookUp,
     recent: [Option<(BlockKey, Option<u32>)>; REMEMBERED],
     oldest: usize,
+    last: usize,
 }
 
 impl<'a, E: ConeEntry> Reader<'a, E> {
     /// A reader with the parameters that the requests were made with.
     pub fn new(cache: &'a ConeCache<E>, look_up: LookUp) -> Reader<'a, E> {
-        Reader { cache, look_up, recent: [None; REMEMBERED], oldest: 0 }
+        Reader { cache, look_up, recent: [None; REMEMBERED], oldest: 0, last: 0 }
     }
 
     /// The entries for a pixel: with [`LookUp::blend`] the 2×2 texels about it in its chart and level, weighted bilinearly
@@ -78,20 +79,17 @@ impl<'a, E: ConeEntry> Reader<'a, E> {
 
     /// The entry of a texel, if it has samples.
     fn find(&mut self, key: &TexelKey) -> Option<EntryId> {
-        let known = self.recent.iter().flatten().find(|(block, _)| *block == key.block);
-        let slot = match known {
-            Some((_, slot)) => *slot,
-            None => {
-                let slot = self.cache.slot_of.get(&key.block).copied();
-                self.recent[self.oldest] = Some((key.block, slot));
-                self.oldest = (self.oldest + 1) % REMEMBERED;
-                slot
-            }
-        };
-        let slot = slot? as usize;
-        let texel = usize::from(key.texel);
-        let has_samples = self.cache.heads[slot].known >> texel & 1 == 1
-            && self.cache.bodies[slot].entries[texel].confidence() > 0;
-        has_samples.then(|| EntryId::new(slot, texel))
+        let is_it = |recent: &Option<(BlockKey, _)>| recent.is_some_and(|(block, _)| block == key.block);
+        if !is_it(&self.recent[self.last]) {
+            self.last = self.recent.iter().position(is_it).unwrap_or_else(|| {
+                let at = self.oldest;
+                self.recent[at] = Some((key.block, self.cache.slot_of.get(&key.block).copied()));
+                self.oldest = (at + 1) % REMEMBERED;
+                at
+            });
+        }
+        let slot = self.recent[self.last]?.1? as usize;
+        let has_samples = self.cache.heads[slot].sampled >> key.texel & 1 == 1;
+        has_samples.then(|| EntryId::new(slot, usize::from(key.texel)))
     }
 }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::super::charting::ChartPlace;
 use super::super::entry::{ConeError, check_rules};
-use super::super::key::{BLOCK_TEXELS, BlockKey, KeyHash, SLABS, TexelKey, edge_of, level_of};
+use super::super::key::{BLOCK_TEXELS, BlockKey, KeyHash, SLABS, TexelKey, edge_of, floor, level_of};
 
 /// Side of a tile of pixels.
 const TILE: usize = 64;
@@ -152,6 +152,8 @@ pub(super) struct Nearby {
     block: BlockKey,
     /// In texels of the level.
     at: [f32; 2],
+    /// The texel that it lies in.
+    own: [i32; 2],
     /// First and last texel along x and y that a place of the chart lies in.
     low: [i32; 2],
     high: [i32; 2],
@@ -172,26 +174,24 @@ impl Nearby {
         let (low, high) = if is_slab {
             ([i32::MIN; 2], [i32::MAX; 2])
         } else {
-            let last = size.map(|s| ((f32::from(s) - 0.5).max(0.5) * shrink).floor() as i32);
-            ([(0.5 * shrink).floor() as i32; 2], last)
+            let last = size.map(|s| floor((f32::from(s) - 0.5).max(0.5) * shrink));
+            ([floor(0.5 * shrink); 2], last)
         };
-        let slab = if is_slab { (depth * shrink).floor() as i32 } else { 0 };
+        let slab = if is_slab { floor(depth * shrink) } else { 0 };
         let block = BlockKey { instance: pixel.instance, chart, level, slab, x: 0, y: 0 };
-        Some(Nearby { block, at, low, high })
+        Some(Nearby { block, at, own: at.map(floor), low, high })
     }
 
     /// The texel that the place lies in.
     pub(super) fn own(&self) -> TexelKey {
-        let [x, y] = self.at.map(|v| v.floor() as i32);
-        self.block.texel_at(x, y)
+        self.block.texel_at(self.own[0], self.own[1])
     }
 
     /// Calls for each texel of the 2×2 whose centres are about the place, with its weight and its coordinates.
     pub(super) fn each_of_four(&self, mut visit: impl FnMut(TexelKey, f32, [i32; 2])) {
         let [u, v] = self.at.map(|v| v - 0.5);
-        let [x0, y0] = [u.floor(), v.floor()];
-        let (right, down) = (u - x0, v - y0);
-        let (x0, y0) = (x0 as i32, y0 as i32);
+        let (x0, y0) = (floor(u), floor(v));
+        let (right, down) = ((u - x0 as f32).clamp(0.0, 1.0), (v - y0 as f32).clamp(0.0, 1.0));
         for (dy, weight_y) in [(0, 1.0 - down), (1, down)] {
             for (dx, weight_x) in [(0, 1.0 - right), (1, right)] {
                 let at = [x0.saturating_add(dx), y0.saturating_add(dy)];
@@ -207,9 +207,8 @@ impl Nearby {
     fn rank(&self, texel: [i32; 2]) -> f32 {
         let from_centre = |k: usize| self.at[k] - (texel[k] as f32 + 0.5);
         let (x, y) = (from_centre(0), from_centre(1));
-        let inside = self.at[0].floor() as i32 == texel[0] && self.at[1].floor() as i32 == texel[1];
-        // Less than 1.5 texels away in either direction, so less than 8 squared.
-        x * x + y * y + if inside { 0.0 } else { OUTSIDE }
+        // A place inside is at most ½ away along either axis.
+        x * x + y * y + if texel == self.own { 0.0 } else { OUTSIDE }
     }
 }
 
