@@ -71,7 +71,7 @@ impl<'a> Sampler<'a> {
 }
 
 /// From depths; at half resolution, where they lie twice as far apart, the geometry's, which upsampling needs there anyway.
-fn normal_seen(screen: &Screen, at: [usize; 2]) -> Vec3 {
+pub(super) fn normal_seen(screen: &Screen, at: [usize; 2]) -> Vec3 {
     let own = screen.normals_view()[at[1] * screen.columns() as usize + at[0]];
     if screen.is_half() && own != Vec3::ZERO { own } else { normal_view(screen, at) }
 }

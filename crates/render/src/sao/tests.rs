@@ -109,6 +109,21 @@ fn normals_from_depth_are_those_of_faces() {
 }
 
 #[test]
+fn at_half_resolution_normals_are_the_geometrys() {
+    let (_, screen) =
+        draw(&still_life(), &look(Vec3::new(3.2, 2.4, 1.8), Vec3::new(0.5, 0.5, 0.0)), [160, 120]);
+    let half = screen.half();
+    let mut differ = 0;
+    for (i, normal) in half.normals_view().iter().enumerate().filter(|(_, normal)| **normal != Vec3::ZERO) {
+        let at = [i % 80, i / 80];
+        assert_eq!(sample::normal_seen(&half, at), *normal);
+        differ += usize::from(sample::normal_view(&half, at).dot(*normal) < 0.99);
+        assert_eq!(sample::normal_seen(&screen, at), sample::normal_view(&screen, at));
+    }
+    assert!(differ > 100, "{differ} by eq. 4 are others'");
+}
+
+#[test]
 fn quads_are_averaged_but_not_over_edges() {
     let numbers: Vec<f32> = (0..25).map(|i| i as f32).collect();
     let quad = |values: &[f32], columns: usize, x: usize, y: usize| {

@@ -106,8 +106,8 @@ fn passes_add_up() {
     let all = &found.tables[1];
     assert_eq!(all.rows.len(), ScreenSpace::ALL.len());
     for row in &all.rows {
-        let sum: f64 = row.values[..3].iter().flatten().sum();
-        assert!((sum - row.values[3].unwrap()).abs() < 1e-9, "{row:?}");
+        let sum: f64 = row.values[..4].iter().flatten().sum();
+        assert!((sum - row.values[4].unwrap()).abs() < 1e-9, "{row:?}");
         assert_eq!(row.values[0].is_some(), row.name == "sao", "{row:?}");
     }
 }

@@ -130,7 +130,7 @@ fn bond(x: u32, y: u32, across: u32, down: u32) -> ([u32; 2], u32) {
     let column = (shifted * across / SIZE).min(across - 1);
     let edge = |v: u32, n: u32, i: u32| {
         let (from, to) = (i * SIZE / n, (i + 1) * SIZE / n);
-        (v - from).min(to - 1 - v)
+        (v.saturating_sub(from)).min(to.saturating_sub(v + 1))
     };
     ([column, row], edge(shifted, across, column).min(edge(y, down, row)))
 }
