@@ -129,7 +129,7 @@ fn bond(x: u32, y: u32, across: u32, down: u32) -> ([u32; 2], u32) {
     let shifted = (x + (row % 2) * SIZE / (2 * across)) % SIZE;
     let column = (shifted * across / SIZE).min(across - 1);
     let edge = |v: u32, n: u32, i: u32| {
-        let (from, to) = (i * SIZE / n, (i + 1) * SIZE / n);
+        let (from, to) = ((i * SIZE).div_ceil(n), ((i + 1) * SIZE).div_ceil(n));
         (v - from).min(to - 1 - v)
     };
     ([column, row], edge(shifted, across, column).min(edge(y, down, row)))
