@@ -121,7 +121,7 @@ pub(super) fn craft(detail: Detail) -> Things {
             [-1.7, 2.2, at, 0.5, 0.5],
         ];
         k.at(Hull, &hull(detail, &nacelle, 2.0), Vec3::ZERO);
-        let nozzle = [[0.0, 0.1], [0.3, 0.1], [0.38, 0.62], [0.44, 0.62], [0.5, 0.1], [0.5, 0.0]];
+        let nozzle = [[0.0, 0.0], [0.5, 0.0], [0.5, 0.1], [0.44, 0.62], [0.38, 0.62], [0.3, 0.1], [0.0, 0.1]];
         k.turned_along(DarkSteel, p(-7.25, 2.2, at), Vec3::NEG_X, &nozzle, 40);
         k.turned_along(
             Copper,

@@ -29,7 +29,7 @@ fn way(which: usize) -> Vec<Vec3> {
     match which {
         LOW | HIGH => {
             let ([x, z], [low, high], sign) = match which {
-                LOW => ([10.6, 6.9], [2.7, 4.6], 1.0),
+                LOW => ([10.6, 6.0], [2.8, 4.6], 1.0),
                 _ => ([7.6, 4.4], [5.4, 6.6], -1.0),
             };
             (0..16)
@@ -44,7 +44,7 @@ fn way(which: usize) -> Vec<Vec3> {
             // Around a store: along the aisle, through the gap, behind it along the wall, and out through the other gap.
             let (side, bay) = (if which < 6 { -1.0 } else { 1.0 }, BAY_X[which % 6]);
             let half = 2.95;
-            let (near, far) = (side * 7.4, side * (BAY_Z + 2.0));
+            let (near, far) = (side * 7.8, side * (BAY_Z + 2.0));
             let lift = [1.5, 2.3, 1.9, 2.6, 1.4, 2.1][(which * 5 + which / 6) % 6];
             let mut points = vec![
                 p(bay - half, lift, near),
@@ -55,8 +55,8 @@ fn way(which: usize) -> Vec<Vec3> {
                 p(bay + half, lift - 0.5, far),
                 p(bay + half, lift - 0.6, 0.5 * (near + far)),
                 p(bay + half, lift, near),
-                p(bay + 0.4 * half, lift + 0.6, side * 6.6),
-                p(bay - 0.4 * half, lift + 0.3, side * 6.6),
+                p(bay + 0.4 * half, lift + 0.6, side * 7.3),
+                p(bay - 0.4 * half, lift + 0.3, side * 7.3),
             ];
             if which % 2 == 1 {
                 points.reverse();
@@ -115,11 +115,11 @@ pub(super) fn aisle() -> (Vec<Vec3>, Vec<Vec3>) {
     let path = vec![
         eye(-17.6, 6.4),
         eye(-15.4, 6.7),
-        eye(-12.8, 6.6),
-        eye(-9.6, 5.6),
-        eye(-6.2, 5.6),
-        eye(-2.8, 5.7),
-        eye(0.6, 5.4),
+        eye(-12.8, 7.0),
+        eye(-9.6, 6.3),
+        eye(-6.2, 6.2),
+        eye(-2.8, 6.2),
+        eye(0.6, 5.8),
         eye(3.8, 4.8),
         eye(6.8, 4.0),
         eye(9.4, 2.6),

@@ -107,12 +107,12 @@ impl Palette {
     }
 }
 
-/// The radiance of a lamp of a colour: such that each kind gives about 0.8 lx at 2 m.
+/// The radiance of a lamp of a colour: such that each kind gives about 2 lx at 2 m.
 pub(super) fn radiance(lamp: Lamp, color: usize) -> Vec3 {
     let strength = match lamp {
-        Lamp::Sphere => 70.0,
-        Lamp::Ring => 42.0,
-        Lamp::Rectangle | Lamp::Disc => 24.0,
+        Lamp::Sphere => 170.0,
+        Lamp::Ring => 105.0,
+        Lamp::Rectangle | Lamp::Disc => 60.0,
     };
     COLORS[color % COLORS.len()] * strength
 }
@@ -171,7 +171,8 @@ fn plate(x: u32, y: u32) -> ([u32; 2], u32) {
     let shifted = (x + (row % 2) * SIZE / 8) % SIZE;
     let edge = |v: u32, n: u32| {
         let i = v * n / SIZE;
-        (v - i * SIZE / n).min(((i + 1) * SIZE / n).saturating_sub(1 + v))
+        let (from, to) = ((i * SIZE).div_ceil(n), ((i + 1) * SIZE).div_ceil(n));
+        (v - from).min(to - 1 - v)
     };
     ([shifted * 4 / SIZE, row], edge(shifted, 4).min(edge(y, 6)))
 }

@@ -76,7 +76,7 @@ pub(super) const PALLETS: [([f32; 2], f32); 6] = [
     ([16.9, -0.4], 1.3),
 ];
 /// The fan on its stand: middle (x, y, z), turn, radius of its blades.
-pub(super) const FAN: (Vec3, f32, f32) = (Vec3::new(-12.4, 1.75, 4.9), 2.1, 1.15);
+pub(super) const FAN: (Vec3, f32, f32) = (Vec3::new(-12.4, 1.75, 4.3), 2.1, 1.15);
 
 /// What a drone carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -32,7 +32,9 @@ fn bytes_layout_and_triangle_counts_are_as_promised() {
 #[test]
 fn meshes_are_closed_and_outward() {
     for detail in [DETAIL, 1.0] {
-        document::assert_closed(&read(&glb("hangar", detail).expect("hangar")), is_sheet);
+        let doc = read(&glb("hangar", detail).expect("hangar"));
+        document::assert_closed(&doc, is_sheet);
+        document::assert_pieces_outward(&doc, is_sheet);
     }
 }
 

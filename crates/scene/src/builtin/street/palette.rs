@@ -46,10 +46,10 @@ pub(super) enum Stuff {
 /// Materials in the order of [`Stuff`].
 pub(super) struct Palette(Vec<MaterialId>);
 
-/// Radiances: each light gives about 2 lx at 2 m.
-const WARM: Vec3 = Vec3::new(62.0, 40.0, 19.0);
-const COOL: Vec3 = Vec3::new(42.0, 66.0, 82.0);
-const CUBE: Vec3 = Vec3::new(44.0, 19.0, 34.0);
+/// Radiances: each light gives about 1 lx at 4 m.
+const WARM: Vec3 = Vec3::new(140.0, 90.0, 43.0);
+const COOL: Vec3 = Vec3::new(110.0, 172.0, 214.0);
+const CUBE: Vec3 = Vec3::new(100.0, 43.0, 77.0);
 
 impl Palette {
     /// Adds all materials, their textures and normal maps.
@@ -129,8 +129,8 @@ fn bond(x: u32, y: u32, across: u32, down: u32) -> ([u32; 2], u32) {
     let shifted = (x + (row % 2) * SIZE / (2 * across)) % SIZE;
     let column = (shifted * across / SIZE).min(across - 1);
     let edge = |v: u32, n: u32, i: u32| {
-        let (from, to) = (i * SIZE / n, (i + 1) * SIZE / n);
-        (v.saturating_sub(from)).min(to.saturating_sub(v + 1))
+        let (from, to) = ((i * SIZE).div_ceil(n), ((i + 1) * SIZE).div_ceil(n));
+        (v - from).min(to - 1 - v)
     };
     ([column, row], edge(shifted, across, column).min(edge(y, down, row)))
 }
@@ -148,7 +148,7 @@ fn cobbles() -> Vec<u8> {
 fn cobble_height(x: u32, y: u32) -> f32 {
     let (_, edge) = bond(x, y, 8, 8);
     let t = (edge as f32 / 14.0).min(1.0);
-    0.012 * (1.0 - (1.0 - t) * (1.0 - t)) + 0.002 * tiling(851, x, y, [16.0, 16.0], 3)
+    0.0045 * (1.0 - (1.0 - t) * (1.0 - t)) + 0.002 * tiling(851, x, y, [16.0, 16.0], 3)
 }
 
 /// Slabs of half a metre.

@@ -18,6 +18,11 @@ fn loaded() -> Scene {
     crate::load("street.glb", &SMALL, &NoFiles).expect("loads")
 }
 
+/// Single layers, open on purpose.
+fn is_sheet(name: &str) -> bool {
+    name == "awning-cloth"
+}
+
 #[test]
 fn bytes_layout_and_triangle_counts_are_as_promised() {
     let hash = "";
@@ -27,9 +32,9 @@ fn bytes_layout_and_triangle_counts_are_as_promised() {
 #[test]
 fn meshes_are_closed_and_outward() {
     for detail in [DETAIL, 1.0] {
-        document::assert_closed(&read(&glb("street", detail).expect("street")), |name| {
-            name == "awning-cloth"
-        });
+        let doc = read(&glb("street", detail).expect("street"));
+        document::assert_closed(&doc, is_sheet);
+        document::assert_pieces_outward(&doc, is_sheet);
     }
 }
 

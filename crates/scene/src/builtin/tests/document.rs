@@ -137,6 +137,49 @@ pub(in crate::builtin) fn assert_closed(doc: &Doc, is_sheet: impl Fn(&str) -> bo
     }
 }
 
+/// Checks that every connected piece of a mesh, but of sheets, encloses a volume of its own: none is inside out within others.
+pub(in crate::builtin) fn assert_pieces_outward(doc: &Doc, is_sheet: impl Fn(&str) -> bool) {
+    for mesh in doc.gltf.meshes().filter(|mesh| !is_sheet(mesh.name().expect("named"))) {
+        let name = mesh.name().expect("named");
+        let (corners, _) = triangles(doc, &mesh);
+        let mut ids: BTreeMap<[u32; 3], usize> = BTreeMap::new();
+        let mut parent: Vec<usize> = Vec::new();
+        fn root(parent: &mut [usize], mut i: usize) -> usize {
+            while parent[i] != i {
+                parent[i] = parent[parent[i]];
+                i = parent[i];
+            }
+            i
+        }
+        let mut firsts = Vec::with_capacity(corners.len());
+        for t in &corners {
+            let [a, b, c] = t.map(|p| {
+                let next = parent.len();
+                let id = *ids.entry((p + Vec3::ZERO).to_array().map(f32::to_bits)).or_insert(next);
+                if id == next {
+                    parent.push(next);
+                }
+                id
+            });
+            for v in [b, c] {
+                let (p, q) = (root(&mut parent, a), root(&mut parent, v));
+                parent[p.max(q)] = p.min(q);
+            }
+            firsts.push(a);
+        }
+        let mut volumes: BTreeMap<usize, (f64, Vec3)> = BTreeMap::new();
+        for (t, &first) in corners.iter().zip(&firsts) {
+            let piece = volumes.entry(root(&mut parent, first)).or_insert((0.0, t[0]));
+            // About a corner of the piece, so that small ones far away keep their digits.
+            let [a, b, c] = t.map(|p| (p - piece.1).as_dvec3());
+            piece.0 += a.dot(b.cross(c)) / 6.0;
+        }
+        for (volume, at) in volumes.values() {
+            assert!(*volume > 0.0, "{name}: the piece at {at} is inside out ({volume} m³)");
+        }
+    }
+}
+
 /// Checks that no vertex normal points to the back of its triangle.
 pub(in crate::builtin) fn assert_normals_agree(doc: &Doc) {
     for mesh in doc.gltf.meshes() {

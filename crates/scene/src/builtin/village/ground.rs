@@ -131,15 +131,15 @@ pub(super) fn water(detail: Detail) -> Geometry {
     g
 }
 
-/// A tuft of grass about its root: blades that bend, each of two triangles, one layer.
+/// A patch of grass about its middle: blades that bend, each of two triangles, one layer.
 pub(super) fn tuft(seed: u32, detail: Detail) -> Geometry {
     let mut g = Geometry::new();
-    for i in 0..detail.count(34, 8) {
+    for i in 0..detail.count(96, 16) {
         let r = |k: u32| unit(seed, 8 * i + k);
         let (s, c) = libm::sincosf(TAU * r(0));
         let (out, side) = (Vec3::new(c, 0.0, s), Vec3::new(-s, 0.0, c));
         let (s, c) = libm::sincosf(TAU * r(1));
-        let root = Vec3::new(c, 0.0, s) * (0.24 * r(2)) - Vec3::Y * 0.05;
+        let root = Vec3::new(c, 0.0, s) * (0.85 * libm::sqrtf(r(2))) - Vec3::Y * 0.05;
         let height = 0.16 + 0.26 * r(3);
         let middle = root + Vec3::Y * (0.6 * height) + out * (0.14 * height);
         let tip = root + Vec3::Y * height + out * (height * (0.3 + 0.5 * r(4)));
@@ -172,16 +172,16 @@ pub(super) fn tuft(seed: u32, detail: Detail) -> Geometry {
 /// Where tufts grow: place (x, z), turn, scale.
 pub(super) fn tufts() -> Vec<([f32; 2], f32, f32)> {
     let mut placed = Vec::new();
-    for i in 0..420 {
-        let p = Vec2::new(unit(521, i) - 0.5, unit(522, i) - 0.5) * (2.0 * LAND - 8.0);
+    for i in 0..900 {
+        let p = Vec2::new(unit(521, i) - 0.5, unit(522, i) - 0.5) * (2.0 * LAND - 14.0);
         let free = PLOTS.iter().all(|plot| {
             let half = DESIGNS[plot.design].half;
             let (s, c) = libm::sincosf(plot.turn);
             let d = p - Vec2::from(plot.at);
             let local = Vec2::new(c * d.x - s * d.y, s * d.x + c * d.y).abs();
-            local.x > half[0] + 0.3 || local.y > half[1] + 0.3
+            local.x > half[0] + 1.0 || local.y > half[1] + 1.0
         });
-        if off_road(p) > 0.4 && off_pond(p) > 1.15 && free && placed.len() < 150 {
+        if off_road(p) > 0.95 && off_pond(p) > 1.4 && free && placed.len() < 190 {
             placed.push((p.to_array(), TAU * unit(523, i), 0.7 + 0.7 * unit(524, i)));
         }
     }

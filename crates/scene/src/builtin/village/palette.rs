@@ -47,9 +47,9 @@ pub(super) enum Stuff {
 /// Materials in the order of [`Stuff`].
 pub(super) struct Palette(Vec<MaterialId>);
 
-/// Radiances: a torch lights what is 1.5 m away with about 1.5 lx, the moon the land with about 0.3 lx.
-const FLAME: Vec3 = Vec3::new(260.0, 128.0, 40.0);
-const MOON: Vec3 = Vec3::new(8.6, 10.6, 14.5);
+/// Radiances: a torch lights what is 1.5 m away with about 2 lx, the moon the land with about 0.5 lx.
+const FLAME: Vec3 = Vec3::new(400.0, 200.0, 68.0);
+const MOON: Vec3 = Vec3::new(15.0, 18.5, 25.0);
 
 impl Palette {
     /// Adds all materials, their textures and normal maps.
