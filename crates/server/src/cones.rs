@@ -195,6 +195,7 @@ impl<E: Update> ConeServer<E> {
     }
 
     /// Position and unit normal, in the world, of an entry that was wanted in the last step.
+    #[inline]
     pub fn place_of(&self, id: EntryId) -> Option<(Vec3, Vec3)> {
         self.places.of_entry(id).map(|place| (place.position_world, place.normal_world))
     }

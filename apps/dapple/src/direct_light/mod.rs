@@ -6,13 +6,12 @@ use dapple_render::shade::shading_points;
 use dapple_render::slc::{Caps, Form, Samples, SlcShading, pixel_places, shade_cones};
 use dapple_scene::area_lights::{AreaLights, Pick};
 use dapple_scene::glam::Vec3;
-use dapple_scene::{PosedCamera, ShadingPoint};
+use dapple_scene::{Pose, PosedCamera, Projection, ShadingPoint};
 use dapple_server::cones::{ConeServer, ConeStep, Now, Update};
-use dapple_store::cones::{
-    BoundingEntry, BoundingParams, CacheCounts, CacheParams, Charting, LookUp, MomentEntry, MomentParams,
-    View,
+use dapple_store::cones::{BoundingEntry, CacheCounts, CacheParams, Charting, LookUp, MomentEntry, View};
+use dapple_trace::direct::{
+    DirectParams, NO_PIXEL, Restir, RestirParams, RestirView, RisParams, Sequence, trace_direct, trace_ris,
 };
-use dapple_trace::direct::{DirectParams, Sequence, trace_direct};
 use dapple_trace::slc::{PaperParams, SlcParams};
 
 /// How lights are sampled.
@@ -38,6 +37,10 @@ impl Sampler {
 pub(crate) enum Technique {
     /// So many rays a pixel.
     Rays { samples: u32, sampler: Sampler },
+    /// One ray a pixel, to the best of 32 candidates.
+    Ris { sampler: Sampler },
+    /// The same with what neighbours and the last frames chose.
+    Restir { sampler: Sampler, unbiased: bool },
     /// The paper's cones.
     PaperCones { params: PaperParams, look_up: LookUp },
     /// Ours.
@@ -60,6 +63,29 @@ impl Technique {
             params: SlcParams::default(),
             look_up: LookUp::default(),
             samples: Samples::Adaptive,
+        }
+    }
+}
+
+impl Technique {
+    /// Our cones, sampled otherwise.
+    pub(crate) fn with_sampler(self, sampler: Sampler) -> Technique {
+        let (pick, sequence) = sampler.parts();
+        match self {
+            Technique::Cones { params, look_up, samples } => {
+                Technique::Cones { params: SlcParams { pick, sequence, ..params }, look_up, samples }
+            }
+            other => other,
+        }
+    }
+
+    /// Our cones, of a pixel's own texel alone.
+    pub(crate) fn without_blending(self) -> Technique {
+        match self {
+            Technique::Cones { params, look_up, samples } => {
+                Technique::Cones { params, look_up: LookUp { blend: false, ..look_up }, samples }
+            }
+            other => other,
         }
     }
 }
@@ -92,6 +118,8 @@ pub(crate) struct Cost {
 /// A technique at work for several viewers, frame after frame.
 pub(crate) enum Lighter {
     Rays { samples: u32, sampler: Sampler, frame: u64 },
+    Ris { sampler: Sampler, frame: u64 },
+    Restir(Box<Reservoirs>),
     Paper(Box<(ConeServer<BoundingEntry>, PaperParams, LookUp)>),
     Cones(Box<(ConeServer<MomentEntry>, SlcParams, LookUp, Samples)>),
 }
@@ -100,6 +128,14 @@ impl Lighter {
     pub(crate) fn new(technique: Technique) -> Result<Lighter> {
         Ok(match technique {
             Technique::Rays { samples, sampler } => Lighter::Rays { samples, sampler, frame: 0 },
+            Technique::Ris { sampler } => Lighter::Ris { sampler, frame: 0 },
+            Technique::Restir { sampler, unbiased } => Lighter::Restir(Box::new(Reservoirs {
+                sampler,
+                unbiased,
+                frame: 0,
+                viewers: Vec::new(),
+                before: None,
+            })),
             Technique::PaperCones { params, look_up } => {
                 Lighter::Paper(Box::new((ConeServer::new(CacheParams::default(), look_up)?, params, look_up)))
             }
@@ -114,7 +150,7 @@ impl Lighter {
 
     /// Whether a frame is the same whatever came before.
     pub(crate) fn is_stateless(&self) -> bool {
-        matches!(self, Lighter::Rays { .. })
+        matches!(self, Lighter::Rays { .. } | Lighter::Ris { .. })
     }
 
     /// Radiance of every pixel of every viewer. `pass` is called after each stage with its name.
@@ -142,6 +178,31 @@ impl Lighter {
                 *frame += 1;
                 (pictures, Cost { rays, ..Cost::default() })
             }
+            Lighter::Ris { sampler, frame } => {
+                let (pick, sequence) = sampler.parts();
+                let mut rays = 0;
+                let pictures = seen.iter().enumerate().map(|(viewer, seen)| {
+                    let params = RisParams {
+                        pick,
+                        sequence,
+                        seed: viewer as u64,
+                        frame: *frame,
+                        ..RisParams::default()
+                    };
+                    let mut out = vec![Vec3::ZERO; seen.points.len()];
+                    rays += trace_ris(now.tracer, lights, &seen.points, &params, &mut out).rays;
+                    out
+                });
+                let pictures = pictures.collect();
+                pass("rays");
+                *frame += 1;
+                (pictures, Cost { rays, ..Cost::default() })
+            }
+            Lighter::Restir(reservoirs) => {
+                let found = reservoirs.light(now, lights, seen);
+                pass("rays");
+                found
+            }
             Lighter::Paper(of) => {
                 let (server, params, look_up) = &mut **of;
                 let shading =
@@ -155,6 +216,62 @@ impl Lighter {
             }
         }
     }
+}
+
+/// What ReSTIR remembers of all viewers.
+pub(crate) struct Reservoirs {
+    sampler: Sampler,
+    unbiased: bool,
+    frame: u64,
+    viewers: Vec<Restir>,
+    before: Option<(Pose, Vec<PosedCamera>)>,
+}
+
+impl Reservoirs {
+    fn light(&mut self, now: &Now<'_>, lights: &AreaLights<'_>, seen: &[Seen]) -> (Vec<Vec<Vec3>>, Cost) {
+        let (pick, sequence) = self.sampler.parts();
+        let defaults = if self.unbiased { RestirParams::unbiased() } else { RestirParams::default() };
+        self.viewers.resize_with(seen.len(), Restir::new);
+        let mut rays = 0;
+        let mut pictures = Vec::new();
+        for (viewer, (seen, restir)) in seen.iter().zip(&mut self.viewers).enumerate() {
+            let params = RestirParams { pick, sequence, seed: viewer as u64, frame: self.frame, ..defaults };
+            let previous = self.before.as_ref().and_then(|(pose, cameras)| {
+                Some(previous_pixels(now, pose, cameras.get(viewer)?, &seen.gbuffer))
+            });
+            let view = RestirView {
+                points: &seen.points,
+                size: [seen.gbuffer.width, seen.gbuffer.height].map(|side| side as usize),
+                eye_world: seen.camera.eye_world(),
+                previous_pixels: previous.as_deref(),
+                past: None,
+            };
+            let mut out = vec![Vec3::ZERO; seen.points.len()];
+            rays += restir.trace(now.tracer, lights, &view, &params, &mut out).rays;
+            pictures.push(out);
+        }
+        self.frame += 1;
+        self.before = Some((now.pose.clone(), seen.iter().map(|seen| seen.camera).collect()));
+        (pictures, Cost { rays, ..Cost::default() })
+    }
+}
+
+/// The pixel that showed each pixel's place in the last picture.
+fn previous_pixels(now: &Now<'_>, pose: &Pose, camera: &PosedCamera, gbuffer: &GBuffer) -> Vec<u32> {
+    let view_from_world = camera.view_from_world();
+    let (width, height) = (gbuffer.width as f32, gbuffer.height as f32);
+    gbuffer.map_surfaces(now.scene, pose, |_, surface| {
+        let Some(surface) = surface else { return NO_PIXEL };
+        let at = view_from_world.transform_point3(surface.position_world);
+        let half = match camera.projection {
+            Projection::Perspective { yfov, .. } => libm::tanf(0.5 * yfov) * -at.z,
+            Projection::Orthographic { half_height, .. } => half_height,
+        };
+        let x = (0.5 + 0.5 * at.x / (half * width / height)) * width;
+        let y = (0.5 - 0.5 * at.y / half) * height;
+        let inside = half > 0.0 && (0.0..width).contains(&x) && (0.0..height).contains(&y);
+        if inside { y as u32 * gbuffer.width + x as u32 } else { NO_PIXEL }
+    })
 }
 
 fn with_cones<E: Update + Caps>(
@@ -194,14 +311,4 @@ pub(crate) fn truth(now: &Now<'_>, lights: &AreaLights<'_>, seen: &Seen, samples
     let mut out = vec![Vec3::ZERO; seen.points.len()];
     trace_direct(now.tracer, lights, &seen.points, &params, &mut out);
     out
-}
-
-/// Parameters of cones that studies change.
-pub(crate) fn moment_params(cones: u8) -> MomentParams {
-    MomentParams { cones, ..MomentParams::default() }
-}
-
-/// The same of the paper's.
-pub(crate) fn bounding_params(cones: u8, discard: bool) -> BoundingParams {
-    BoundingParams { cones, discard, ..BoundingParams::default() }
 }

@@ -174,13 +174,24 @@ impl<'a> Lens<'a> {
             lanes[3][i] = nl;
             lanes[4][i] = dot(entry).max(0.0);
         }
-        let [diffuse, gloss, grazing, cosine, entry] = lanes.map(|lane| lane.iter().sum());
+        let [diffuse, gloss, grazing, cosine, entry] = lanes.map(|lane| sum_of(&lane));
         Sums { diffuse, gloss, grazing, cosine, entry }
     }
 
     fn n_dot_v_signed(&self) -> f32 {
         self.point.normal_shading_world.dot(self.point.to_viewer_world)
     }
+}
+
+/// Sum of lanes, four chains at a time: one would wait for each addition.
+fn sum_of<const N: usize>(lane: &[f32; N]) -> f32 {
+    let mut sums = [0.0f32; 4];
+    for chunk in lane.chunks(4) {
+        for (sum, value) in sums.iter_mut().zip(chunk) {
+            *sum += value;
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
 }
 
 /// Mean cosine at an entry below which a cone is not taken at its word.

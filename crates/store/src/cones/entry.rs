@@ -70,6 +70,7 @@ pub(super) fn check_rules(rules: impl IntoIterator<Item = Rule>) -> Result<(), C
 }
 
 /// Luminance of linear red, green and blue (Rec. 709).
+#[inline]
 pub fn luminance(colour: Vec3) -> f32 {
     0.2126 * colour.x + 0.7152 * colour.y + 0.0722 * colour.z
 }
@@ -81,6 +82,7 @@ pub(super) fn unit(v: Vec3) -> Option<Vec3> {
 }
 
 /// Angle between unit vectors, radians.
+#[inline]
 pub(super) fn angle_between(a: Vec3, b: Vec3) -> f32 {
     libm::acosf(a.dot(b).clamp(-1.0, 1.0))
 }

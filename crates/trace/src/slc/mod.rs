@@ -37,8 +37,8 @@ pub struct SlcParams {
     pub first_samples: u32,
     /// Updates with that many, default 8 ([Stadlbauer2023] sec. 4).
     pub first_updates: u32,
-    /// Samples of an update after that, while nothing changes, default 1 ([Stadlbauer2023] sec. 4). None are taken once an entry stands
-    /// for [`MomentParams::max_samples`]: where nothing changes it is as good as it gets.
+    /// Samples a frame after that, while nothing changes, default 1 ([Stadlbauer2023] sec. 4), taken several at a time. None are taken once an entry
+    /// stands for [`MomentParams::max_samples`]: where nothing changes it is as good as it gets. 0: none.
     pub samples: u32,
     /// How lights are picked, default by fluence.
     pub pick: Pick,
@@ -99,10 +99,12 @@ pub fn update_moment_cones(
     let lights = changes.lights();
     let SlcParams { pick, sequence, seed, .. } = *params;
     let source = Source { pick, sequence, seed, with_cosine: true };
+    let frame = cache.frame();
     let updated = cache.update(queue, |index, texel, entry| {
         let (Some(place), false) = (places.get(index), lights.is_empty()) else { return false };
         let change = changes.of(place, texel.instance);
-        let mut count = quiet_samples(entry, params);
+        let site = site_of(texel.instance, texel.place.triangle, texel.place.barycentrics);
+        let mut count = quiet_samples(entry, params, frame.wrapping_add(site as u32));
         if change.share > LEAST_SHARE {
             changed.fetch_add(1, Ordering::Relaxed);
             let root = change.share.sqrt();
@@ -120,7 +122,6 @@ pub fn update_moment_cones(
             return false;
         }
         let mut samples = Vec::with_capacity(count as usize);
-        let site = site_of(texel.instance, texel.place.triangle, texel.place.barycentrics);
         let traced = take_samples(
             tracer,
             lights,
@@ -139,13 +140,17 @@ pub fn update_moment_cones(
     SlcCounts { updated, rays: rays.into_inner(), changed: changed.into_inner() }
 }
 
-/// Samples of an entry about which nothing changed.
-fn quiet_samples(entry: &MomentEntry, params: &SlcParams) -> u32 {
-    let most = params.moment.max_samples;
-    if u32::from(entry.samples()) < (params.first_samples * params.first_updates).min(u32::from(most)) {
-        params.first_samples
-    } else if entry.samples() < most {
-        params.samples
+/// Samples of an entry about which nothing changed. Rays from one place together are quicker than apart, so a grown entry takes several in
+/// one of as many frames; `phase` says whose turn it is.
+fn quiet_samples(entry: &MomentEntry, params: &SlcParams, phase: u32) -> u32 {
+    let (first, most) = (params.first_samples.max(1), u32::from(params.moment.max_samples));
+    let grown = first.saturating_mul(params.first_updates).min(most);
+    let has = u32::from(entry.samples());
+    let turns = (first / params.samples.max(1)).max(1);
+    if has < grown {
+        first
+    } else if has < most && params.samples > 0 && phase.is_multiple_of(turns) {
+        params.samples.saturating_mul(turns).min(most - has)
     } else {
         0
     }

@@ -60,11 +60,13 @@ impl EntryPlaces {
     }
 
     /// Of the queue's texel with that index, if its instance is there.
+    #[inline]
     pub fn get(&self, index: usize) -> Option<&EntryPlace> {
         self.places.get(index).filter(|p| p.normal_world != Vec3::ZERO)
     }
 
     /// Of an entry that is in the queue.
+    #[inline]
     pub fn of_entry(&self, id: EntryId) -> Option<&EntryPlace> {
         self.get(*self.of_entry.get(id.index())? as usize)
     }

@@ -50,6 +50,7 @@ const BUILTIN: [(&str, &str, &str); 7] = [
         include_str!("../../../suites/stochastic-others.toml"),
         "the same on scenes by others, found with --scenes-folder",
     ),
+    ("slc", include_str!("../../../suites/slc.toml")),
 ];
 
 /// A suite as its file says it.

@@ -57,7 +57,7 @@ pub(super) trait Study: std::fmt::Debug {
 type Reader = fn(&mut toml::Table) -> Result<Box<dyn Study>>;
 
 /// Every kind by its name.
-const KINDS: [(&str, Reader); 15] = [
+const KINDS: [(&str, Reader); 16] = [
     ("z-precision", |table| own::<z_precision::ZPrecision>(table, &["distances", "triangles"])),
     ("mip-filters", |table| own::<mip_filters::MipFilters>(table, &[])),
     ("radius", |table| own::<radius::Radius>(table, &["radii", "line-bytes"])),
@@ -73,6 +73,9 @@ const KINDS: [(&str, Reader); 15] = [
     ("light-methods", |table| own::<light::table::LightMethods>(table, &["steps", "truth-samples"])),
     ("light-viewers", |table| {
         own::<light::viewers::LightViewers>(table, &["viewers", "steps", "truth-samples"])
+    }),
+    ("light-ablation", |table| {
+        own::<light::ablation::LightAblation>(table, &["updates", "truth-samples", "sizes", "speeds"])
     }),
     ("pop-in", |table| own::<pop_in::PopIn>(table, &["steps"])),
 ];

@@ -70,6 +70,7 @@ impl EntryId {
     }
 
     /// Its number: small, and its own among all entries of the cache.
+    #[inline]
     pub fn index(self) -> usize {
         self.0 as usize
     }
@@ -224,6 +225,7 @@ impl<E: ConeEntry> ConeCache<E> {
     }
 
     /// An entry, if it has a place.
+    #[inline]
     pub fn entry(&self, id: EntryId) -> Option<&E> {
         let head = self.heads.get(id.slot())?;
         (head.known >> id.texel() & 1 == 1).then(|| &self.bodies[id.slot()].entries[id.texel()])

@@ -89,12 +89,14 @@ pub struct MomentCone {
 
 impl MomentCone {
     /// Unit vector along the cone's axis: the mean direction of its light. +Z where opposite directions cancel.
+    #[inline]
     pub fn direction(&self) -> Vec3 {
         unit(self.moment).unwrap_or(Vec3::Z)
     }
 
     /// Cosine of the opening angle (axis to rim), −1 … 1: that of the cap which, evenly bright, has the same moment, for which
     /// |m| / lum(E) = (1 + cos a) / 2.
+    #[inline]
     pub fn cos_angle(&self) -> f32 {
         let luminance = luminance(self.energy);
         if luminance < GONE {
@@ -167,6 +169,7 @@ impl MomentEntry {
     }
 
     /// Its cones; none where it is dark.
+    #[inline]
     pub fn cones(&self) -> &[MomentCone] {
         &self.cones[..usize::from(self.count)]
     }
@@ -255,6 +258,7 @@ impl MomentEntry {
 }
 
 impl ConeEntry for MomentEntry {
+    #[inline]
     fn confidence(&self) -> u16 {
         self.samples
     }

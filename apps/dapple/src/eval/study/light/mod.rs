@@ -1,5 +1,6 @@
 //! Studies of direct light from area lights: light cones and their rivals ([Stadlbauer2023]).
 
+pub(super) mod ablation;
 pub(super) mod table;
 pub(super) mod viewers;
 

@@ -33,8 +33,15 @@ fn techniques() -> Vec<(&'static str, Technique)> {
         ("rt-16, best sampler", Technique::rays(16, best)),
         ("rt-48", Technique::rays(48, power)),
         ("rt-48, best sampler", Technique::rays(48, best)),
+        ("ris", Technique::Ris { sampler: power }),
+        ("ris, best sampler", Technique::Ris { sampler: best }),
+        ("restir-di", Technique::Restir { sampler: power, unbiased: false }),
+        ("restir-di, best sampler", Technique::Restir { sampler: best, unbiased: false }),
+        ("restir-di unbiased, best sampler", Technique::Restir { sampler: best, unbiased: true }),
         ("slc-paper", Technique::paper_cones(power)),
         ("slc-paper, best sampler", Technique::paper_cones(best)),
+        ("slc, power", Technique::cones().with_sampler(power)),
+        ("slc, one texel", Technique::cones().without_blending()),
         ("slc", Technique::cones()),
     ]
 }

@@ -93,6 +93,7 @@ fn techniques() -> Vec<(&'static str, Technique)> {
     vec![
         ("rt-16", Technique::rays(16, Sampler::Power)),
         ("rt-48", Technique::rays(48, Sampler::Power)),
+        ("restir-di", Technique::Restir { sampler: Sampler::Power, unbiased: false }),
         ("slc-paper", Technique::paper_cones(Sampler::Power)),
         ("slc", Technique::cones()),
     ]
