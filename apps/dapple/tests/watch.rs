@@ -154,7 +154,10 @@ fn what_cannot_be_shown_is_named() {
         (&["view", "sheet.glb", "--fade", "-1"], &["--fade"]),
         (&["view", "sheet.glb", "--second-camera"], &["--second-camera", "sd-ssao or sd-hbao-plus"]),
         (&["view", "sheet.glb", "--method", "sd-hbao", "--second-camera"], &["--second-camera"]),
-        (&["view", "sheet.glb", "--method", "sd-ssao", "--second-camera=-1"], &["--second-camera", "above 0"]),
+        (
+            &["view", "sheet.glb", "--method", "sd-ssao", "--second-camera=-1"],
+            &["--second-camera", "above 0"],
+        ),
         (&["view", "sheet.glb", "--camera", "roof"], &["roof", "front"]),
         (&["view", "sheet.glb", "--view", "depth"], &["depth", "beauty"]),
         (&["view", "sheet.glb", "--frames", "3"], &["--headless"]),
@@ -200,7 +203,18 @@ fn headless(at: &Path, arguments: &[&str]) -> Option<String> {
 fn a_second_camera_sees_more() {
     let folder = folder();
     let at = folder.path();
-    let common = ["--builtin", "atrium", "--detail", "0.1", "--points", "20", "--size", "160x90", "--view", "visibility"];
+    let common = [
+        "--builtin",
+        "atrium",
+        "--detail",
+        "0.1",
+        "--points",
+        "20",
+        "--size",
+        "160x90",
+        "--view",
+        "visibility",
+    ];
     for method in ["sd-ssao", "sd-hbao-plus"] {
         let names = [format!("{method}-one"), format!("{method}-two")];
         for (name, second) in names.iter().zip([None, Some("--second-camera=1.5")]) {
