@@ -203,6 +203,8 @@ impl Pipelines {
         }
         // Whose depths are all there is.
         let has_no_target = matches!(key.stage, Stage::Depths | Stage::Hidden);
+        // Depths alone need no fragment stage where nothing is cut out.
+        let has_fragments = key.stage != Stage::Depths || key.cuts_holes;
         let entry_point = if key.stage == Stage::Depths { "depth_fragment" } else { "fragment" };
         let options = |constants| wgpu::PipelineCompilationOptions { constants, ..Default::default() };
         gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
@@ -221,7 +223,7 @@ impl Pipelines {
             },
             depth_stencil: Some(depth(!key.blends)),
             multisample: multisample(samples),
-            fragment: Some(wgpu::FragmentState {
+            fragment: has_fragments.then(|| wgpu::FragmentState {
                 module: &stage.module,
                 entry_point: Some(entry_point),
                 compilation_options: options(&fragment_constants),

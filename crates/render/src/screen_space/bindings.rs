@@ -27,7 +27,7 @@ impl Kit {
     pub(super) fn new(gpu: &Gpu) -> Kit {
         let device = &gpu.device;
         let looking = [(0, UNIFORM), (1, TEXTURE), (2, TEXTURES)];
-        let beside = [(5, UNIFORM), (6, TEXTURE), (7, TEXTURE), (8, UNIFORM)];
+        let beside = [(5, UNIFORM), (6, TEXTURE), (7, TEXTURE)];
         Kit {
             screen_layout: layout(device, "screen", &[(0, UNIFORM), (1, TEXTURE), (2, TEXTURE)]),
             pass_layouts: [

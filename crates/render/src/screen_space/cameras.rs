@@ -21,6 +21,8 @@ pub(super) struct SideCamera {
     pub(super) camera: PosedCamera,
     pub(super) size: (u32, u32),
     pub(super) side_from_main: Affine3A,
+    /// Whether the first one's passes see half the resolution.
+    pub(super) main_is_half: bool,
 }
 
 impl Cameras {
@@ -48,7 +50,7 @@ impl Cameras {
         }]
     }
 
-    /// The way from the first camera to the second.
+    /// What passes of the second camera know of the first.
     pub(super) fn side(&self) -> &wgpu::Buffer {
         &self.side
     }
@@ -69,7 +71,9 @@ impl Cameras {
         if let Some(side) = side {
             let beside = ScreenUniform::new(&side.camera, side.size);
             copy(gpu, encoder, side_buffer, bytemuck::bytes_of(&beside));
-            copy(gpu, encoder, &self.side, bytemuck::bytes_of(&SideUniform::new(&side.side_from_main)));
+            let main = if side.main_is_half { whole.half() } else { whole };
+            let main = SideUniform::new(main, &side.side_from_main);
+            copy(gpu, encoder, &self.side, bytemuck::bytes_of(&main));
         }
     }
 }

@@ -61,7 +61,8 @@ impl ScreenView {
         let (columns, rows) = self.guarded();
         let camera = side.camera(main, f64::from(columns) / f64::from(rows))?;
         let size = side.size([columns, rows]).into();
-        Ok(Some(SideCamera { camera, size, side_from_main: side_from_main(main, &camera) }))
+        let side_from_main = side_from_main(main, &camera);
+        Ok(Some(SideCamera { camera, size, side_from_main, main_is_half: self.half_resolution }))
     }
 }
 

@@ -150,17 +150,13 @@ impl Plan {
                 Shader::Resolve => passed.push((3, before)),
                 Shader::Distance => passed.extend([(1, before), (4, Resource::Sampler(&kit.nearest))]),
                 Shader::SsaoBeside | Shader::HbaoBeside => {
-                    let (main, normals) = match view.half_resolution {
-                        true => (Sight::Half, Image::HalfNormals),
-                        false => (Sight::Whole, Image::Normals),
-                    };
+                    let normals = if view.half_resolution { Image::HalfNormals } else { Image::Normals };
                     passed.extend([
                         (1, before),
                         (2, Resource::Texture(&side_hidden.all)),
-                        (5, Resource::Uniform(cameras.screen(main))),
+                        (5, Resource::Uniform(cameras.side())),
                         (6, Resource::Texture(&all_distances)),
                         (7, Resource::Texture(&views[&normals])),
-                        (8, Resource::Uniform(cameras.side())),
                     ]);
                 }
                 Shader::Ssao | Shader::Hbao if layers > 0 => {

@@ -60,7 +60,7 @@ fn uniforms_are_laid_out_as_in_the_shaders() {
         span is_parallel is_half depth samples_per_metre pad);
     check(Shader::Distance, "Screen", size_of::<ScreenUniform>(), &members);
     check(Shader::HbaoBeside, "Screen", size_of::<ScreenUniform>(), &members);
-    let members = members!(SideUniform: side_from_main_x side_from_main_y side_from_main_z);
+    let members = members!(SideUniform: main side_from_main_x side_from_main_y side_from_main_z);
     check(Shader::HbaoBeside, "SideParams", size_of::<SideUniform>(), &members);
     check(Shader::SsaoBeside, "SideParams", size_of::<SideUniform>(), &members);
     let members = members!(BilateralUniform: axis taps stride tolerance_m inverse_sigma pad);

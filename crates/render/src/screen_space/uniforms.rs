@@ -60,22 +60,23 @@ impl ScreenUniform {
     }
 }
 
-/// `SideParams` in `beside.wgsl`: rows of the map from the first camera's view space to the second one's.
+/// `SideParams` in `beside.wgsl`: the first camera's picture, and rows of the map from its view space to the second one's.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(super) struct SideUniform {
+    pub(super) main: ScreenUniform,
     pub(super) side_from_main_x: [f32; 4],
     pub(super) side_from_main_y: [f32; 4],
     pub(super) side_from_main_z: [f32; 4],
 }
 
 impl SideUniform {
-    pub(super) fn new(side_from_main: &Affine3A) -> SideUniform {
+    pub(super) fn new(main: ScreenUniform, side_from_main: &Affine3A) -> SideUniform {
         let rows = side_from_main.matrix3.transpose();
         let [x, y, z] = [rows.x_axis, rows.y_axis, rows.z_axis].map(Vec3::from);
         let t = side_from_main.translation;
         let [x, y, z] = [x.extend(t.x), y.extend(t.y), z.extend(t.z)].map(|row| row.to_array());
-        SideUniform { side_from_main_x: x, side_from_main_y: y, side_from_main_z: z }
+        SideUniform { main, side_from_main_x: x, side_from_main_y: y, side_from_main_z: z }
     }
 }
 
