@@ -5,7 +5,9 @@ use glam::{Affine3A, Mat3, Vec3};
 use super::palette::Stuff::{self, *};
 use super::plan::*;
 use crate::builtin::Detail;
+use crate::builtin::builder::rotation_y;
 use crate::builtin::kit::Kit;
+use crate::builtin::shapes::Geometry;
 
 type Things = Kit<Stuff>;
 
@@ -13,24 +15,38 @@ fn p(x: f32, y: f32, z: f32) -> Vec3 {
     Vec3::new(x, y, z)
 }
 
-/// Floor, walls and roof: thick slabs.
-pub(super) fn shell(detail: Detail) -> Things {
+/// Floor, walls and roof as seen from inside, one layer; a rail along the walls' joint, and a plinth.
+pub(super) fn shell(detail: Detail) -> [Things; 2] {
     let mut k: Things = Kit::new(detail);
-    let ([x, z], c, w) = (HALL, CEILING, 0.4);
-    k.plain(Floor, [-x - w, -0.5, -z - w], [x + w, 0.0, z + w]);
-    k.plain(Roof, [-x - w, c, -z - w], [x + w, c + 0.3, z + w]);
-    for s in [-1.0_f32, 1.0] {
-        let (a, b) = (s * z, s * (z + w));
-        k.plain(Wall, [-x - w, -0.1, a.min(b)], [x + w, 2.6, a.max(b)]);
-        k.plain(Cladding, [-x - w, 2.6, a.min(b)], [x + w, c + 0.05, a.max(b)]);
-        // A rail along the joint, and a plinth.
-        let (a, b) = (s * (z - 0.08), s * (z + 0.05));
-        k.block(Structure, [-x, 2.52, a.min(b)], [x, 2.7, a.max(b)], 0.02);
-        k.block(Structure, [-x, -0.05, a.min(b)], [x, 0.16, a.max(b)], 0.015);
-        let (a, b) = (s * x, s * (x + w));
-        k.plain(Cladding, [a.min(b), -0.1, -z], [a.max(b), c + 0.05, z]);
+    let ([x, z], c, joint) = (HALL, CEILING, 2.6);
+    let mut face = |of: Stuff, corners: [Vec3; 4]| {
+        let mut piece = Geometry::new();
+        piece.polygon(&corners);
+        k.at(of, &piece, Vec3::ZERO);
+    };
+    face(Floor, [p(-x, 0.0, z), p(x, 0.0, z), p(x, 0.0, -z), p(-x, 0.0, -z)]);
+    face(Roof, [p(-x, c, -z), p(x, c, -z), p(x, c, z), p(-x, c, z)]);
+    for turn in 0..4 {
+        let (half, out) = if turn % 2 == 0 { (x, z) } else { (z, x) };
+        let rotation = rotation_y(std::f32::consts::FRAC_PI_2 * turn as f32);
+        // The wall that looks along +Z, turned. Walls at the ends are clad from the floor on.
+        for (of, y0, y1) in [(if turn % 2 == 0 { Wall } else { Cladding }, 0.0, joint), (Cladding, joint, c)]
+        {
+            let corner = |s: f32, y: f32| {
+                let q = rotation * p(s * half, y, -out);
+                // Quarter turns leave crumbs; corners are shared to the last bit.
+                p(x.copysign(q.x), q.y, z.copysign(q.z))
+            };
+            face(of, [corner(-1.0, y0), corner(1.0, y0), corner(1.0, y1), corner(-1.0, y1)]);
+        }
     }
-    k
+    let mut rails: Things = Kit::new(detail);
+    for s in [-1.0_f32, 1.0] {
+        let (a, b) = (s * (z - 0.08), s * (z + 0.05));
+        rails.block(Structure, [-x, 2.52, a.min(b)], [x, 2.7, a.max(b)], 0.02);
+        rails.block(Structure, [-x, -0.05, a.min(b)], [x, 0.16, a.max(b)], 0.015);
+    }
+    [k, rails]
 }
 
 /// Trusses across the hall, their columns, purlins and braces.

@@ -41,8 +41,10 @@ fn make(b: &mut GlbBuilder, palette: &Palette, name: &str, kit: &Kit<Stuff>) -> 
 }
 
 fn build(b: &mut GlbBuilder, palette: &Palette, detail: Detail) {
+    let [shell, skirting] = hall::shell(detail);
     for (name, kit) in [
-        ("shell", hall::shell(detail)),
+        ("shell", shell),
+        ("skirting", skirting),
         ("trusses", hall::trusses(detail)),
         ("doors", hall::doors(detail)),
         ("services", hall::services(detail)),

@@ -56,7 +56,7 @@ impl Palette {
         let floor = b.texture("floor", size, &floor(), false)?;
         let panel = b.texture("panel", size, &panel(), false)?;
         let waves = b.texture("cladding-relief", size, &normal_map(1.0, wave_height), false)?;
-        let plates = b.texture("hull-relief", size, &normal_map(2.0, plate_height), false)?;
+        let plates = b.texture("hull-relief", size, &normal_map(1.0, plate_height), false)?;
         let hull = b.texture("hull", size, &hull(), false)?;
         let wood = b.texture("wood", size, &wood(), false)?;
         let matt = MaterialSpec::matt;
@@ -165,29 +165,26 @@ fn wave_height(x: u32, _: u32) -> f32 {
     0.03 * (1.6 * (1.0 - (2.0 * t - 1.0).abs() * 2.0)).clamp(-1.0, 1.0)
 }
 
-/// Distance in texels from a seam of the craft's plates: four by six to two metres, by turns.
+/// Which of the craft's plates a texel is of, a metre long and half as high, shifted by turns; how far it is from a seam in texels.
 fn plate(x: u32, y: u32) -> ([u32; 2], u32) {
-    let row = y * 6 / SIZE;
-    let shifted = (x + (row % 2) * SIZE / 8) % SIZE;
-    let edge = |v: u32, n: u32| {
-        let i = v * n / SIZE;
-        let (from, to) = ((i * SIZE).div_ceil(n), ((i + 1) * SIZE).div_ceil(n));
-        (v - from).min(to - 1 - v)
-    };
-    ([shifted * 4 / SIZE, row], edge(shifted, 4).min(edge(y, 6)))
+    let half = SIZE / 2;
+    let row = y / half;
+    let shifted = (x + row * SIZE / 3) % SIZE;
+    let edge = |v: u32, n: u32| (v % n).min(n - 1 - v % n);
+    ([0, row], edge(shifted, SIZE).min(edge(y, half)))
 }
 
 fn plate_height(x: u32, y: u32) -> f32 {
     let (_, edge) = plate(x, y);
-    0.004 * (edge as f32 / 2.0).min(1.0)
+    0.0015 * (edge as f32 / 2.0).min(1.0)
 }
 
 /// Painted plates, each of its own shade, streaked.
 fn hull() -> Vec<u8> {
     paint(|x, y| {
         let (which, edge) = plate(x, y);
-        let shade = 1.0 + 0.1 * own(67, which[0], which[1]) + 0.1 * tiling(907, x, y, [10.0, 3.0], 4);
-        let base = if edge < 1 { 0.34 } else { 0.68 };
+        let shade = 1.0 + 0.08 * own(67, which[0], which[1]) + 0.08 * tiling(907, x, y, [10.0, 3.0], 4);
+        let base = if edge < 1 { 0.42 } else { 0.68 };
         [base * shade, base * shade, 0.98 * base * shade, 1.0]
     })
 }

@@ -211,7 +211,6 @@ pub(super) fn house(detail: Detail, which: usize) -> Things {
     let front = &FRONT[which];
     let half = 0.5 * HOUSE;
     let top = GROUND_FLOOR + STOREY * front.storeys as f32;
-    k.plain(front.wall, [-half, -0.3, -4.0], [half, top, -WALL]);
     shop(&mut k, front, half);
     let pitch = HOUSE / front.bays as f32;
     let wide = if front.bays == 3 { 1.25 } else { 1.0 };
@@ -242,6 +241,15 @@ pub(super) fn house(detail: Detail, which: usize) -> Things {
     quoins(&mut k, half, top);
     cornice(&mut k, half, top);
     roof(&mut k, front, half, top, &openings);
+    k
+}
+
+/// What fills a house behind its front: nobody sees it.
+pub(super) fn core(detail: Detail, which: usize) -> Things {
+    let mut k: Things = Kit::new(detail);
+    let half = 0.5 * HOUSE;
+    let top = GROUND_FLOOR + STOREY * FRONT[which].storeys as f32;
+    k.plain(FRONT[which].wall, [-half, -0.3, -4.0], [half, top, -WALL + 0.01]);
     k
 }
 

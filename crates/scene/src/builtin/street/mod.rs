@@ -54,15 +54,22 @@ fn build(b: &mut GlbBuilder, palette: &Palette, detail: Detail) {
     let houses: Vec<MeshId> = (0..FRONT.len())
         .map(|i| make(b, palette, &format!("house-{i}"), &fronts::house(detail, i)))
         .collect();
+    let cores: Vec<MeshId> =
+        (0..FRONT.len()).map(|i| make(b, palette, &format!("core-{i}"), &fronts::core(detail, i))).collect();
+    // Cores block light but carry none.
+    let put = |b: &mut GlbBuilder, which: usize, at: Vec3, turn: f32| {
+        b.node("house", &NodeSpec::mesh_at(houses[which], at, turn));
+        b.node("core", &NodeSpec { receives: false, ..NodeSpec::mesh_at(cores[which], at, turn) });
+    };
     for (side, row) in ROWS.iter().enumerate() {
         for (i, &which) in row.iter().enumerate() {
             let (at, turn) = house_place(side, i);
-            b.node("house", &NodeSpec::mesh_at(houses[which], at, turn));
+            put(b, which, at, turn);
         }
     }
     // The east end: a house across, and walls beside it.
     let east = Vec3::new(LENGTH + 0.35, PAVEMENT, 0.0);
-    b.node("house", &NodeSpec::mesh_at(houses[4], east, -FRAC_PI_2));
+    put(b, 4, east, -FRAC_PI_2);
     let mut wing: Kit<Stuff> = Kit::new(detail);
     for s in [-1.0_f32, 1.0] {
         let (a, z) = (s * 0.5 * HOUSE, s * (FRONTS + 4.0));

@@ -34,7 +34,7 @@ fn vertex(g: &mut Geometry, position: Vec3) -> u32 {
 
 /// Grass and road: together with [`block`] they are closed.
 pub(super) fn surface(detail: Detail) -> [Geometry; 2] {
-    let n = detail.facets(150, 40);
+    let n = detail.facets(136, 40);
     let step = 2.0 * LAND / n as f32;
     let corner = |i: u32, j: u32| {
         let p = Vec2::new(-LAND + step * i as f32, -LAND + step * j as f32);

@@ -7,6 +7,7 @@ use super::plan::{DESIGNS, Design};
 use crate::builtin::Detail;
 use crate::builtin::kit::Kit;
 use crate::builtin::noise::unit;
+use crate::builtin::shapes::Geometry;
 
 type Things = Kit<Stuff>;
 
@@ -203,7 +204,40 @@ fn openings(k: &mut Things, design: &Design, which: usize) {
     }
 }
 
-/// Two slopes of shingles on boards, rafters' ends, barge boards that cross over the ridge.
+/// A strip of shingles down a slope: x across between two lines, y down from 0 to `long`, z out of the slope. Its underside is flat; its
+/// outside steps in `rows`, each of which juts out and is lifted by what `uneven` tells. Closed.
+fn steps([x0, x1]: [f32; 2], long: f32, rows: u32, uneven: impl Fn(u32) -> [f32; 2]) -> Geometry {
+    let mut g = Geometry::new();
+    let low = 0.07;
+    let mut from = 0.0;
+    for row in 0..rows {
+        let [jut, lift] = uneven(row);
+        let last = row + 1 == rows;
+        let to = if last { long } else { long * (row + 1) as f32 / rows as f32 + jut };
+        let high = 0.125 + lift;
+        // The outside and the underside.
+        g.polygon(&[p(x0, from, low), p(x1, from, low), p(x1, to, high), p(x0, to, high)]);
+        g.polygon(&[p(x1, from, 0.0), p(x0, from, 0.0), p(x0, to, 0.0), p(x1, to, 0.0)]);
+        // The step down to the next row, and the sides with a corner where that row begins.
+        let foot = if last { 0.0 } else { low };
+        g.polygon(&[p(x0, to, high), p(x1, to, high), p(x1, to, foot), p(x0, to, foot)]);
+        let mut side = vec![[from, 0.0], [to, 0.0]];
+        if !last {
+            side.push([to, low]);
+        }
+        side.extend([[to, high], [from, low]]);
+        let right: Vec<Vec3> = side.iter().map(|&[y, z]| p(x1, y, z)).collect();
+        g.polygon(&right);
+        let mut left: Vec<Vec3> = side.iter().map(|&[y, z]| p(x0, y, z)).collect();
+        left[1..].reverse();
+        g.polygon(&left);
+        from = to;
+    }
+    g.polygon(&[p(x0, 0.0, 0.0), p(x1, 0.0, 0.0), p(x1, 0.0, low), p(x0, 0.0, low)]);
+    g
+}
+
+/// Two slopes of shingles, rafters' ends, barge boards that cross over the ridge.
 fn roof(k: &mut Things, design: &Design, which: usize) {
     let [hx, hz] = design.half;
     let (eaves, ridge) = (design.eaves, design.ridge);
@@ -220,27 +254,20 @@ fn roof(k: &mut Things, design: &Design, which: usize) {
         let axes = glam::Mat3::from_cols(Vec3::NEG_X, down, out);
         let place = Affine3A::from_quat(turn) * Affine3A::from_mat3_translation(axes, p(0.0, ridge, 0.0));
         let mut piece: Things = Kit::new(k.detail);
-        piece.plain(Boards, [-half, -0.0, 0.0], [half, long, 0.07]);
         let rows = libm::roundf(long / if which == 3 { 0.42 } else { 0.34 }) as u32;
-        let pitch = long / rows as f32;
-        for row in 0..rows {
-            let y = pitch * row as f32;
-            let count = if k.fine() { libm::roundf(2.0 * half / 0.36) as u32 } else { 1 };
-            let width = 2.0 * half / count as f32;
-            for i in 0..count {
-                let r = |c: u32| unit(530 + which as u32 * 2 + u32::from(s > 0.0), (row * 64 + i) * 4 + c);
-                let jut = if k.fine() { 0.05 * r(0) } else { 0.02 };
-                let x = -half + width * i as f32;
-                let lift = 0.012 * r(1);
-                // The upper end lies under the next row above.
-                let (y0, y1) = ((y - 0.12).max(0.0), y + pitch + jut);
-                let (z0, z1) = (0.052, 0.118 + lift);
-                let outline = [[y0, z0], [y1, z0], [y1, z1], [y0, z0 + 0.035]];
-                // Swept along x: (y, z) of the slope are the outline's axes.
-                let axes = glam::Mat3::from_cols(Vec3::Y, Vec3::Z, Vec3::X);
-                let gap = if k.fine() { 0.006 } else { 0.0 };
-                piece.prism(shingle, &outline, [x + gap, x + width - gap], &Affine3A::from_mat3(axes));
-            }
+        // At full detail every column of shingles is a strip of its own, whose steps are uneven.
+        let columns = if k.fine() { libm::roundf(2.0 * half / 0.36) as u32 } else { 1 };
+        let width = 2.0 * half / columns as f32;
+        let gap = if k.fine() { 0.003 } else { 0.0 };
+        for column in 0..columns {
+            let seed = 530 + which as u32 * 2 + u32::from(s > 0.0);
+            let x = -half + width * column as f32;
+            let strip = steps([x + gap, x + width - gap], long, rows, |row| match k.detail.0 >= 0.4 {
+                true => [0.045, 0.014]
+                    .map(|most| most * unit(seed, (row * 64 + column) * 2 + u32::from(most < 0.03))),
+                false => [0.0; 2],
+            });
+            piece.at(shingle, &strip, Vec3::ZERO);
         }
         k.all(&piece, &place);
         // Rafters' ends under the eaves.

@@ -48,13 +48,11 @@ fn lay_land(b: &mut GlbBuilder, palette: &Palette, detail: Detail) {
     let surface = ground::surface(detail);
     let block = ground::block(&surface);
     let [grass, road] = &surface;
-    let land = [
-        (grass, palette.of(Stuff::Grass)),
-        (road, palette.of(Stuff::Road)),
-        (&block, palette.of(Stuff::Earth)),
-    ];
-    let land = b.mesh("land", &land);
+    let land = b.mesh("land", &[(grass, palette.of(Stuff::Grass)), (road, palette.of(Stuff::Road))]);
     b.node("land", &NodeSpec::mesh_at(land, Vec3::ZERO, 0.0));
+    // Nobody sees it, so it carries no light.
+    let bedrock = b.mesh("bedrock", &[(&block, palette.of(Stuff::Earth))]);
+    b.node("bedrock", &NodeSpec { receives: false, ..NodeSpec::mesh_at(bedrock, Vec3::ZERO, 0.0) });
     let water = b.mesh("water", &[(&ground::water(detail), palette.of(Stuff::Water))]);
     b.node("water", &NodeSpec::mesh_at(water, Vec3::ZERO, 0.0));
 }

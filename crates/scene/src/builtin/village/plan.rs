@@ -9,13 +9,13 @@ pub(super) const SECONDS: f32 = 15.0;
 /// Frames of a camera path.
 pub(super) const FRAMES: u32 = 900;
 /// Half the side of the square of land.
-pub(super) const LAND: f32 = 34.0;
+pub(super) const LAND: f32 = 30.5;
 /// How deep the land's block reaches.
 pub(super) const BEDROCK: f32 = -2.5;
 
 /// The road's middle line, from west to east.
 pub(super) const ROAD: [[f32; 2]; 9] = [
-    [-36.0, 4.5],
+    [-33.0, 4.2],
     [-27.0, 3.4],
     [-18.0, 2.4],
     [-9.5, 0.2],
@@ -23,7 +23,7 @@ pub(super) const ROAD: [[f32; 2]; 9] = [
     [8.5, 2.0],
     [17.5, 1.0],
     [26.0, -2.0],
-    [36.0, -5.5],
+    [33.0, -4.5],
 ];
 /// The lane from the road to the hall.
 pub(super) const LANE: [[f32; 2]; 3] = [[0.0, 0.5], [-0.4, -5.0], [-0.6, -10.2]];
@@ -192,7 +192,7 @@ pub(super) const TREES: [([f32; 2], f32, f32); 12] = [
 ];
 
 /// Firs: how many are tried on the hills around.
-pub(super) const FIRS: u32 = 64;
+pub(super) const FIRS: u32 = 72;
 
 /// Rocks: (x, z) and radius.
 pub(super) const ROCKS: [([f32; 2], f32); 14] = [
@@ -207,7 +207,7 @@ pub(super) const ROCKS: [([f32; 2], f32); 14] = [
     ([25.8, 11.2], 0.7),
     ([-19.8, -15.8], 0.9),
     ([-26.2, -14.6], 0.7),
-    ([28.4, -9.0], 0.9),
+    ([27.8, -9.0], 0.9),
     ([3.6, -22.4], 1.2),
     ([-15.0, 19.4], 1.1),
 ];
@@ -249,7 +249,7 @@ pub(super) fn ground(p: Vec2) -> f32 {
     let at = Vec3::new(p.x, 0.0, p.y);
     let r = p.length();
     let swell = 0.16 * fractal_noise(501, at / 6.5, 3);
-    let hills = smooth(18.0, 33.0, r) * (2.6 + 2.2 * fractal_noise(505, at / 11.0, 3));
+    let hills = smooth(18.0, 31.0, r) * (2.6 + 2.2 * fractal_noise(505, at / 11.0, 3));
     let road = from_line(p, &ROAD).min(from_line(p, &LANE));
     // The road runs through the hills in a hollow way, its crown a little lower than the green.
     let cut = 1.0 - smooth(ROAD_HALF, ROAD_HALF + 6.0, road);
@@ -277,7 +277,7 @@ pub(super) fn firs() -> Vec<([f32; 2], f32, f32)> {
     let mut placed: Vec<([f32; 2], f32, f32)> = Vec::new();
     for i in 0..FIRS {
         let (s, c) = libm::sincosf(std::f32::consts::TAU * (i as f32 + 0.8 * unit(511, i)) / FIRS as f32);
-        let r = 22.0 + 10.0 * unit(512, i);
+        let r = 21.5 + 12.0 * unit(512, i);
         let p = Vec2::new(r * c, r * s);
         let far = placed.iter().all(|(q, _, _)| p.distance(Vec2::from(*q)) > 2.4);
         let free = PLOTS.iter().all(|plot| p.distance(Vec2::from(plot.at)) > 7.5)

@@ -1,5 +1,6 @@
 //! The village as a file: valid, closed, outward, the same twice; as many flames as promised, things on the ground.
 
+use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use glam::{Vec2, Vec3};
@@ -20,7 +21,7 @@ fn loaded() -> Scene {
 
 /// Single layers, open on purpose.
 fn is_sheet(name: &str) -> bool {
-    name.ends_with("leaves") || ["water", "awning-cloth", "moon"].contains(&name)
+    name.ends_with("leaves") || ["land", "bedrock", "water", "awning-cloth", "moon"].contains(&name)
 }
 
 #[test]
@@ -36,6 +37,21 @@ fn meshes_are_closed_and_outward() {
         document::assert_closed(&doc, is_sheet);
         document::assert_pieces_outward(&doc, is_sheet);
     }
+}
+
+#[test]
+fn land_and_bedrock_are_closed_together() {
+    let doc = read(&SMALL);
+    let mut edges: BTreeMap<_, i32> = BTreeMap::new();
+    for mesh in doc.gltf.meshes().filter(|m| matches!(m.name(), Some("land" | "bedrock"))) {
+        for [a, b, c] in document::triangles(&doc, &mesh).0 {
+            for (p, q) in [(a, b), (b, c), (c, a)] {
+                let [p, q] = [p, q].map(|p| (p + Vec3::ZERO).to_array().map(f32::to_bits));
+                *edges.entry((p.min(q), p.max(q))).or_default() += if p < q { 1 } else { -1 };
+            }
+        }
+    }
+    assert!(edges.len() > 1000 && edges.values().all(|&balance| balance == 0));
 }
 
 #[test]
