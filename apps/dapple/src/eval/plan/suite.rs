@@ -50,7 +50,11 @@ const BUILTIN: [(&str, &str, &str); 7] = [
         include_str!("../../../suites/stochastic-others.toml"),
         "the same on scenes by others, found with --scenes-folder",
     ),
-    ("slc", include_str!("../../../suites/slc.toml")),
+    (
+        "slc",
+        include_str!("../../../suites/slc.toml"),
+        "direct light from area lights on four built-in scenes: light cones, rays and resampling, one viewer and many",
+    ),
 ];
 
 /// A suite as its file says it.
