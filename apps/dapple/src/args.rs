@@ -17,6 +17,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::direct_light::picture::DirectLight;
 pub(crate) use bake::BakeArgs;
 pub(crate) use bench::{Bench, BenchArgs, JoinArgs, ServedArgs, SoakArgs, ViewersArgs};
 pub(crate) use bit_rate::BitRate;
@@ -190,6 +191,8 @@ pub(crate) struct RenderArgs {
     /// Points spawned a square metre (psao); half are kept.
     #[arg(long, value_name = "N", default_value_t = 512.0)]
     pub(crate) points: f32,
+    #[command(flatten)]
+    pub(crate) direct: DirectLightArgs,
     /// Samples a pixel along each axis.
     #[arg(long, value_name = "N", default_value_t = 2)]
     pub(crate) supersample: u32,
@@ -203,6 +206,21 @@ pub(crate) struct RenderArgs {
     /// Threads; 0 is one for each core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) threads: usize,
+}
+
+/// Light of whatever emits.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct DirectLightArgs {
+    /// Light surfaces by what emits, by rt-N (N rays a sample), ris, restir-di, slc (light cones) or slc-paper; with -power behind it
+    /// lights are picked as the paper does. No sun is made up then. Without it what emits is seen, but lights nothing.
+    #[arg(long, value_name = "METHOD")]
+    pub(crate) direct_light: Option<DirectLight>,
+    /// Steps at 15 Hz that lead to the picture, for methods that remember (restir-di, slc, slc-paper).
+    #[arg(long, value_name = "N", default_value_t = 16, requires = "direct_light")]
+    pub(crate) light_steps: u32,
+    /// Light from all around: an equirectangular Radiance picture. Its middle lies towards −Z.
+    #[arg(long, value_name = "FILE.hdr", requires = "direct_light")]
+    pub(crate) environment: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Args)]

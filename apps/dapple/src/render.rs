@@ -19,6 +19,8 @@ use dapple_trace::psao::update::UpdateParams;
 use dapple_trace::rtao::{RtaoParams, trace_visibility_with_progress};
 
 use crate::args::{RenderArgs, RenderMethod, View};
+use crate::direct_light;
+use crate::direct_light::picture::{DirectLight, Lighting, read_environment};
 use crate::exr_file::{write_gray, write_rgb};
 use crate::light::{adaptive, publish};
 use crate::picture::{open_directions, sites, write_png};
@@ -36,11 +38,17 @@ pub(crate) fn run(args: &RenderArgs) -> Result<()> {
         width: args.size.width,
         height: args.size.height,
         supersample: args.supersample,
-        shade: Default::default(),
+        shade: shade_params(args),
     };
+    let environment = args.direct.environment.as_deref().map(read_environment).transpose()?;
     let wheel = Bar::spinner("drawing");
-    let drawn = draw(scene, &camera, args.time, &params)?;
+    let mut drawn = draw(scene, &camera, args.time, &params)?;
     drop(wheel);
+    if let Some(DirectLight(technique)) = args.direct.direct_light {
+        let lighting =
+            Lighting { technique, steps: args.direct.light_steps, environment: environment.as_ref() };
+        direct_light::picture::add(&lighting, scene, &camera, args.time, &mut drawn)?;
+    }
     let (path, width, height) = (&args.output, drawn.gbuffer.width, drawn.gbuffer.height);
     match numbers(args, &loaded, &drawn, &camera)? {
         Some(Numbers::Rgb(pixels)) => write_rgb(path, width, height, &pixels)?,
@@ -49,6 +57,11 @@ pub(crate) fn run(args: &RenderArgs) -> Result<()> {
     }
     say!("wrote {}", path.display());
     Ok(())
+}
+
+/// How the picture is shaded: with lights that have an area, no sun is made up.
+fn shade_params(args: &RenderArgs) -> ShadeParams {
+    ShadeParams { sun_without_lights: args.direct.direct_light.is_none(), ..ShadeParams::default() }
 }
 
 /// What an EXR holds.
@@ -149,6 +162,9 @@ fn check(args: &RenderArgs) -> Result<()> {
             "--bent-normals changes pictures of --method psao, rtao, hbao, hbao-plus and these two with hidden surfaces (as sd-hbao-plus) alone: \
              choose one of them, or leave it out"
         );
+    }
+    if !(1..=10_000).contains(&args.direct.light_steps) {
+        bail!("--light-steps is {}, must be 1 to 10000", args.direct.light_steps);
     }
     if !args.time.is_finite() {
         bail!("--time must be a finite number of seconds");

@@ -89,7 +89,8 @@ pub struct Now<'a> {
 }
 
 impl<'a> Now<'a> {
-    fn lights(&self, pose: &Pose) -> AreaLights<'a> {
+    /// Its lights, in this or another pose.
+    pub fn lights(&self, pose: &Pose) -> AreaLights<'a> {
         let lights = AreaLights::new(self.scene, pose);
         match self.environment {
             Some(environment) => lights.with_environment(environment, pose),

@@ -1,5 +1,7 @@
 //! Direct light of area lights by every method that can be compared, on the same pictures, with the same rays, lights and materials.
 
+pub(crate) mod picture;
+
 use anyhow::Result;
 use dapple_render::gbuffer::{GBuffer, rasterize};
 use dapple_render::shade::shading_points;
@@ -100,9 +102,13 @@ pub(crate) struct Seen {
 impl Seen {
     /// One sample a pixel.
     pub(crate) fn new(now: &Now<'_>, camera: PosedCamera, [width, height]: [u32; 2]) -> Result<Seen> {
-        let gbuffer = rasterize(now.scene, now.pose, &camera, width, height, 1)?;
+        Ok(Seen::of(now, camera, rasterize(now.scene, now.pose, &camera, width, height, 1)?))
+    }
+
+    /// What is drawn already.
+    pub(crate) fn of(now: &Now<'_>, camera: PosedCamera, gbuffer: GBuffer) -> Seen {
         let points = shading_points(now.scene, now.pose, &camera, &gbuffer, true);
-        Ok(Seen { camera, gbuffer, points })
+        Seen { camera, gbuffer, points }
     }
 }
 
@@ -151,6 +157,11 @@ impl Lighter {
     /// Whether a frame is the same whatever came before.
     pub(crate) fn is_stateless(&self) -> bool {
         matches!(self, Lighter::Rays { .. } | Lighter::Ris { .. })
+    }
+
+    /// Whether it keeps cones.
+    pub(crate) fn has_cones(&self) -> bool {
+        matches!(self, Lighter::Paper(_) | Lighter::Cones(_))
     }
 
     /// Radiance of every pixel of every viewer. `pass` is called after each stage with its name.

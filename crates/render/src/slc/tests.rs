@@ -1,1 +1,140 @@
+use std::f32::consts::{FRAC_1_PI, TAU};
 
+use dapple_scene::{Reflectance, ShadingPoint};
+use glam::Vec3;
+
+use super::cap::Lens;
+use super::*;
+
+/// A place on a floor, seen from a height of 45°.
+fn floor(diffuse: f32, f0: f32, roughness: f32, specular: bool) -> ShadingPoint {
+    ShadingPoint {
+        instance: 0,
+        position_world: Vec3::ZERO,
+        normal_world: Vec3::Y,
+        normal_shading_world: Vec3::Y,
+        to_viewer_world: Vec3::new(1.0, 1.0, 0.0).normalize(),
+        reflectance: Reflectance {
+            diffuse: Vec3::splat(diffuse),
+            f0: Vec3::splat(f0),
+            alpha: (roughness * roughness).max(2e-3),
+            specular,
+        },
+        emitted: Vec3::ZERO,
+    }
+}
+
+fn ratio(samples: u32) -> SlcShading {
+    SlcShading { samples: Samples::Fixed(samples), ..SlcShading::default() }
+}
+
+/// A cap of radiance 1 as the entry of a place with that normal keeps it: its irradiance, of what is above the horizon, by sums.
+fn cap(direction: Vec3, angle: f32, normal: Vec3) -> Cap {
+    let (mut sum, mut count) = (0.0f64, 0);
+    each_direction(direction, angle, |w| {
+        sum += f64::from(normal.dot(w).max(0.0));
+        count += 1;
+    });
+    let solid_angle = TAU * (1.0 - angle.cos());
+    Cap {
+        direction,
+        cos_angle: angle.cos(),
+        energy: Vec3::splat((sum / f64::from(count)) as f32 * solid_angle),
+    }
+}
+
+/// Many directions evenly in a cap.
+fn each_direction(axis: Vec3, angle: f32, mut call: impl FnMut(Vec3)) {
+    let (tangent, bitangent) = axis.any_orthonormal_pair();
+    for i in 0..4000 {
+        let z = 1.0 - (1.0 - angle.cos()) * (i as f32 + 0.5) / 4000.0;
+        let turn = i as f32 * 2.399_963_2;
+        let r = (1.0 - z * z).max(0.0).sqrt();
+        call(axis * z + tangent * (r * turn.cos()) + bitangent * (r * turn.sin()));
+    }
+}
+
+/// What a cap of radiance 1 leaves towards the viewer, by sums.
+fn exact(point: &ShadingPoint, direction: Vec3, angle: f32) -> f32 {
+    let (mut sum, mut count) = (0.0f64, 0);
+    each_direction(direction, angle, |w| {
+        sum += f64::from(point.reflected(w).x);
+        count += 1;
+    });
+    (sum / f64::from(count)) as f32 * TAU * (1.0 - angle.cos())
+}
+
+fn tilted(degrees: f32) -> Vec3 {
+    let angle = degrees.to_radians();
+    Vec3::new(-angle.sin(), angle.cos(), 0.0)
+}
+
+#[test]
+fn diffuse_light_is_exact_with_any_number_of_directions() {
+    let point = floor(0.6, 0.04, 1.0, false);
+    for (direction, angle) in [(Vec3::Y, 0.3), (tilted(50.0), 0.4), (tilted(88.0), 0.3), (tilted(100.0), 0.5)]
+    {
+        let cap = cap(direction, angle, Vec3::Y);
+        for samples in [4, 8, 16, 64] {
+            let found = Lens::of(&point).shade(&cap, Vec3::Y, &ratio(samples)).x;
+            let exact = cap.energy.x * 0.6 * FRAC_1_PI;
+            // Below the horizon the least cosine takes over.
+            let tolerance = if direction.y > 0.05 { 1e-4 } else { 1.0 };
+            assert!((found - exact).abs() <= tolerance * exact, "{direction} {samples}: {found}, {exact}");
+            assert!(found <= exact * 1.0001, "never more than there is");
+        }
+    }
+}
+
+#[test]
+fn gloss_is_that_of_the_reflectance() {
+    for (roughness, angle) in [(0.15f32, 0.1f32), (0.3, 0.25), (0.6, 0.4), (1.0, 0.6)] {
+        let point = floor(0.3, 0.5, roughness, true);
+        for direction in [tilted(45.0), tilted(20.0), tilted(70.0)] {
+            let cap = cap(direction, angle, Vec3::Y);
+            let exact = exact(&point, direction, angle);
+            let found = |samples| Lens::of(&point).shade(&cap, Vec3::Y, &samples).x;
+            let (many, adaptive) = (found(ratio(64)), found(SlcShading::default()));
+            assert!((many - exact).abs() <= 0.03 * exact, "{roughness} {direction}: {many}, {exact}");
+            assert!((adaptive - exact).abs() <= 0.12 * exact, "{roughness} {direction}: {adaptive}, {exact}");
+        }
+    }
+}
+
+#[test]
+fn fluence_and_irradiance_are_the_same_light() {
+    let point = floor(0.5, 0.04, 0.5, true);
+    let (direction, angle) = (tilted(40.0), 0.2);
+    let irradiance = cap(direction, angle, Vec3::Y);
+    let fluence = Cap { energy: Vec3::splat(TAU * (1.0 - angle.cos())), ..irradiance };
+    let lens = Lens::of(&point);
+    let a = lens.shade(&irradiance, Vec3::Y, &ratio(64)).x;
+    let b = lens.shade(&fluence, Vec3::Y, &SlcShading { form: Form::Fluence, ..ratio(64) }).x;
+    assert!((a - b).abs() <= 5e-3 * a, "{a}, {b}");
+}
+
+#[test]
+fn light_from_behind_the_surface_reaches_nothing_and_nothing_breaks() {
+    let mut point = floor(0.5, 0.04, 0.3, true);
+    // The shading normal leans to the light, which the true surface does not see.
+    point.normal_shading_world = tilted(60.0);
+    let behind = Cap { direction: tilted(100.0), cos_angle: 0.999, energy: Vec3::ONE };
+    assert_eq!(Lens::of(&point).shade(&behind, tilted(60.0), &ratio(16)), Vec3::ZERO);
+    for alpha in [2e-3, 1.0] {
+        for cos_angle in [-1.0, 0.0, 1.0] {
+            for direction in [Vec3::Y, -Vec3::Y, Vec3::X, point.to_viewer_world, -point.to_viewer_world] {
+                for normal in [Vec3::Y, -Vec3::Y, Vec3::ZERO] {
+                    for viewer in [Vec3::Y, Vec3::X, -Vec3::Y] {
+                        point.to_viewer_world = viewer;
+                        point.reflectance.alpha = alpha;
+                        let cap = Cap { direction, cos_angle, energy: Vec3::splat(1e3) };
+                        for samples in [1, 16] {
+                            let found = Lens::of(&point).shade(&cap, normal, &ratio(samples));
+                            assert!(found.is_finite() && found.min_element() >= 0.0, "{found}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

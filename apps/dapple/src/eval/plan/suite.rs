@@ -14,7 +14,7 @@ use crate::source::read_limited;
 const MAX_BYTES: u64 = 1 << 20;
 
 /// Suites that the program brings, by name.
-const BUILTIN: [(&str, &str, &str); 7] = [
+const BUILTIN: [(&str, &str, &str); 8] = [
     (
         "builtins",
         include_str!("../../../suites/builtins.toml"),

@@ -1,0 +1,133 @@
+//! Direct light of one picture, for `dapple render`.
+
+use std::str::FromStr;
+
+use anyhow::{Context, Result, bail};
+use dapple_client::Drawn;
+use dapple_render::gbuffer::GBuffer;
+use dapple_scene::area_lights::{AreaLights, Environment};
+use dapple_scene::glam::Vec3;
+use dapple_scene::{PosedCamera, Projection, Scene};
+use dapple_server::cones::{Now, cone_charts};
+use dapple_store::cones::Charting;
+use dapple_trace::Tracer;
+
+use super::{Lighter, Sampler, Seen, Technique};
+use crate::progress::Bar;
+
+/// Steps a second of what remembers earlier frames.
+const STEPS_HZ: f64 = 15.0;
+
+/// A method for direct light as the command line names it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct DirectLight(pub(crate) Technique);
+
+impl FromStr for DirectLight {
+    type Err = String;
+
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        let (name, sampler) = match s.strip_suffix("-power") {
+            Some(name) => (name, Sampler::Power),
+            None => (s, Sampler::Best),
+        };
+        let rays = name.strip_prefix("rt-").and_then(|n| n.parse().ok()).filter(|n| (1..=65_536).contains(n));
+        let technique = match name {
+            "ris" => Technique::Ris { sampler },
+            "restir-di" => Technique::Restir { sampler, unbiased: false },
+            "slc-paper" => Technique::paper_cones(sampler),
+            "slc" => Technique::cones().with_sampler(sampler),
+            _ => Technique::rays(
+                rays.ok_or("write rt-N (N rays a sample, 1 to 65536), ris, restir-di, slc-paper or slc, each also with -power")?,
+                sampler,
+            ),
+        };
+        Ok(DirectLight(technique))
+    }
+}
+
+/// What a picture's direct light comes from.
+pub(crate) struct Lighting<'a> {
+    pub(crate) technique: Technique,
+    /// Steps that lead to the picture, for methods that remember.
+    pub(crate) steps: u32,
+    pub(crate) environment: Option<&'a Environment>,
+}
+
+/// Adds the light of area lights to what is drawn, and the surroundings behind it.
+pub(crate) fn add(
+    lighting: &Lighting<'_>,
+    scene: &Scene,
+    camera: &PosedCamera,
+    time_s: f64,
+    drawn: &mut Drawn,
+) -> Result<()> {
+    let environment = lighting.environment;
+    if AreaLights::new(scene, &drawn.pose).is_empty() && environment.is_none() {
+        bail!(
+            "--direct-light: nothing in {} emits; give it an --environment, or leave the option out",
+            scene.name
+        );
+    }
+    let mut lighter = Lighter::new(lighting.technique)?;
+    let charting = if lighter.has_cones() { cone_charts(scene).0 } else { Charting::default() };
+    let steps = if lighter.is_stateless() { 1 } else { lighting.steps.max(1) };
+    let bar = Bar::new("direct light", u64::from(steps));
+    let mut tracer = Tracer::new(scene, &drawn.pose);
+    let mut found = Vec::new();
+    for step in 0..steps {
+        let pose = scene.pose(time_s - f64::from(steps - 1 - step) / STEPS_HZ);
+        tracer.update(scene, &pose);
+        let now = Now { scene, pose: &pose, tracer: &tracer, environment };
+        let lights = now.lights(&pose);
+        // Places on surfaces are those of the picture, wherever they were.
+        let seen = [Seen::of(&now, *camera, drawn.gbuffer.clone())];
+        let (mut pictures, _) = lighter.light(&now, &lights, &seen, &charting, &mut |_| ());
+        found = pictures.swap_remove(0);
+        if step + 1 == steps {
+            for ((direct, lit), point) in drawn.shaded.direct.iter_mut().zip(&found).zip(&seen[0].points) {
+                if let Some(point) = point {
+                    *direct += (*lit - point.emitted).max(Vec3::ZERO);
+                }
+            }
+        }
+        bar.set(u64::from(step + 1));
+    }
+    drop(found);
+    if let Some(environment) = environment {
+        show(environment, camera, &drawn.gbuffer, &mut drawn.shaded.direct);
+    }
+    Ok(())
+}
+
+/// Radiance of the surroundings where a picture shows nothing else.
+fn show(environment: &Environment, camera: &PosedCamera, gbuffer: &GBuffer, direct: &mut [Vec3]) {
+    let (width, height) = (gbuffer.width as f32, gbuffer.height as f32);
+    for (i, (sample, radiance)) in gbuffer.samples().iter().zip(direct).enumerate() {
+        if sample.is_covered() {
+            continue;
+        }
+        let [x, y] = gbuffer.sample_position_px(i);
+        let direction = match camera.projection {
+            Projection::Perspective { yfov, .. } => {
+                let half = libm::tanf(0.5 * yfov);
+                Vec3::new(
+                    (2.0 * x / width - 1.0) * half * width / height,
+                    (1.0 - 2.0 * y / height) * half,
+                    -1.0,
+                )
+            }
+            Projection::Orthographic { .. } => Vec3::NEG_Z,
+        };
+        let world = camera.world_from_view.transform_vector3(direction).normalize_or(Vec3::Y);
+        *radiance = environment.radiance(world);
+    }
+}
+
+/// Reads an environment.
+pub(crate) fn read_environment(path: &std::path::Path) -> Result<Environment> {
+    /// 16384 × 8192 texels of four bytes.
+    const MAX_BYTES: u64 = 1 << 29;
+    let bytes = crate::source::read_limited(path, MAX_BYTES)
+        .with_context(|| format!("cannot read the environment {}", path.display()))?;
+    Environment::from_hdr(&bytes).with_context(|| path.display().to_string())
+}
