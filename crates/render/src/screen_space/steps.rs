@@ -45,6 +45,7 @@ pub(super) struct Step {
 
 /// Distances of hidden surfaces: all layers, and a view of each.
 struct HiddenTextures {
+    #[cfg(test)]
     texture: wgpu::Texture,
     all: wgpu::TextureView,
     layers: Vec<wgpu::TextureView>,
@@ -62,7 +63,12 @@ impl HiddenTextures {
                 ..Default::default()
             })
         };
-        HiddenTextures { all: array_view(&texture), layers: (0..layers).map(one).collect(), texture }
+        HiddenTextures {
+            all: array_view(&texture),
+            layers: (0..layers).map(one).collect(),
+            #[cfg(test)]
+            texture,
+        }
     }
 }
 

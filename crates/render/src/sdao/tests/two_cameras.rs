@@ -194,10 +194,11 @@ fn a_wall_that_the_first_camera_looks_along_is_found() {
         (SideParams { coarseness: 2, ..far }, MapParams::with_samples(4)),
     ] {
         let both = [two_cameras(side, map)(&shot), two_cameras_of_ssao(side, map)(&shot)];
-        for found in &both {
+        // Within the radius the wall takes less of SSAO's hemisphere.
+        for (found, dark) in both.iter().zip([0.8, 0.9]) {
             let sides = [1.0, -1.0].map(|sign| beside(found, sign));
             println!("{side:?} {sides:?}");
-            assert!(sides[0] < 0.8, "the wall that the second camera faces: {sides:?}");
+            assert!(sides[0] < dark, "the wall that the second camera faces: {sides:?}");
             assert!(sides[1] > 0.98, "no camera sees the other one: {sides:?}");
         }
     }
