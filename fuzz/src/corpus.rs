@@ -200,6 +200,7 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
 
     let scenes = [("scene.glb", scenes::glb()), ("scene.gltf", scenes::gltf()), ("scene.obj", scenes::obj())];
     seeds.push(("read_weights", "table".to_owned(), crate::weights::table().into_bytes()));
+    seeds.push(("read_environment", "sky".to_owned(), crate::environment::sky()));
     seeds.extend(scenes.map(|(name, bytes)| ("load_scene", name.to_owned(), bytes)));
     seeds
 }

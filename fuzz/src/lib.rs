@@ -6,6 +6,7 @@
 mod camera_path;
 mod cells;
 pub mod corpus;
+mod environment;
 mod frame;
 mod input;
 mod live;
@@ -17,6 +18,7 @@ mod weights;
 
 pub use camera_path::read_camera_path;
 pub use cells::decode_cells;
+pub use environment::read_environment;
 pub use frame::decode_frame;
 pub use input::Random;
 pub use live::live_session;
@@ -30,7 +32,7 @@ pub use weights::read_weights;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 9] = [
+pub const TARGETS: [Target; 10] = [
     ("decode_frame", decode_frame),
     ("decode_cells", decode_cells),
     ("session_ops", session_ops),
@@ -40,4 +42,5 @@ pub const TARGETS: [Target; 9] = [
     ("read_camera_path", read_camera_path),
     ("triangle_soup", triangle_soup),
     ("read_weights", read_weights),
+    ("read_environment", read_environment),
 ];

@@ -275,3 +275,63 @@ fn each_departure_from_the_paper_removes_more() {
     assert!(removed(6) > 70.0 && removed(6) > removed(0) + 10.0, "{:?}", found.tables[0]);
     assert!(removed(5) > removed(4) && removed(11) > 99.0, "{:?}", found.tables[0]);
 }
+
+/// The Cornell box, whose lamp has an area.
+fn lit_box() -> (Scene, CameraPath) {
+    let glb = dapple_scene::builtin::glb("cornell", 0.2).unwrap();
+    let scene = dapple_scene::load("cornell.glb", &glb, &dapple_scene::NoFiles).unwrap();
+    let path = find_path(&scene, Some("path-box")).unwrap();
+    (scene, path)
+}
+
+#[test]
+fn direct_light_by_every_method_is_near_the_truth() {
+    let found = run_on("kind = \"light-methods\"\nsteps = 10\ntruth-samples = 256", [96, 54], &[], lit_box());
+    let of = |name: &str, column: usize| {
+        let row = found.tables[0].rows.iter().find(|row| row.name == name);
+        row.unwrap_or_else(|| panic!("{name}")).values[column].unwrap()
+    };
+    let (rays, psnr, ssim, bias) = (2, 4, 5, 6);
+    for row in &found.tables[0].rows {
+        assert!(of(&row.name, psnr) > 20.0 && of(&row.name, bias).abs() < 12.0, "{row:?}");
+    }
+    assert!(of("slc", psnr) > of("rt-48", psnr) + 1.0 && of("slc", ssim) > of("rt-48", ssim));
+    assert!(of("slc", rays) < of("rt-16", rays));
+    assert!(of("slc", bias).abs() < 1.5, "{}", of("slc", bias));
+    assert!(of("rt-48, best sampler", psnr) > of("rt-16, best sampler", psnr));
+}
+
+#[test]
+fn viewers_share_entries_and_all_see_the_truth() {
+    let text = "kind = \"light-viewers\"\nviewers = [1, 4]\nsteps = 4\ntruth-samples = 32";
+    let found = run_on(text, [48, 27], &[], lit_box());
+    assert_eq!(found.tables.len(), 4);
+    let (entries, psnr) = (2, 4);
+    for table in &found.tables {
+        let row = |name: &str| table.rows.iter().find(|row| row.name == name).unwrap();
+        let [one, four] = ["1 × slc", "4 × slc"].map(|name| row(name).values[entries].unwrap());
+        assert!(one > 0.0 && four > one && four < 4.0 * one, "{}: {one}, {four}", table.title);
+        for row in &table.rows {
+            assert!(row.values[psnr].unwrap() > 12.0, "{row:?}");
+        }
+    }
+    let [together, apart] =
+        [0, 2].map(|t: usize| found.tables[t].rows.iter().find(|r| r.name == "4 × slc").unwrap());
+    assert!(together.values[entries] < apart.values[entries], "who stands together shares more");
+}
+
+#[test]
+fn cones_are_taken_apart() {
+    let text =
+        "kind = \"light-ablation\"\nupdates = 8\ntruth-samples = 128\nsizes = [1.0, 2.0]\nspeeds = [1.0]";
+    let found = run_on(text, [48, 27], &[], lit_box());
+    let of = |name: &str| found.tables[0].rows.iter().find(|row| row.name == name).unwrap();
+    let psnr = |name: &str| of(name).values[0].unwrap();
+    assert!(psnr("slc") >= psnr("slc, 1 cones") - 0.1);
+    assert!(
+        of("slc, bias 4").values[4].unwrap() < 0.3 * of("slc").values[4].unwrap(),
+        "fewer, larger texels"
+    );
+    assert_eq!(found.tables[1].rows.len(), 4);
+    assert_eq!(found.tables[2].rows.len(), 4);
+}

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use serde::Deserialize;
 
-use super::super::{Findings, Study, StudyPlot, StudyTable, Subject, axis, column, line, row};
+use super::super::{Findings, Study, StudyLine, StudyPlot, StudyTable, Subject, axis, column, line, row};
 use super::{Lit, Quality, Run, STEPS_HZ, camera};
 use crate::direct_light::{Sampler, Seen, Technique, truth};
 use crate::eval::stage::Stage;
@@ -46,6 +46,26 @@ fn techniques() -> Vec<(&'static str, Technique)> {
     ]
 }
 
+/// What a method gave: name, quality, milliseconds, of them shading, rays a pixel.
+type Found = (String, Quality, f64, f64, f64);
+
+/// One line for rays of either sampler, and a point for each other method.
+fn lines(rows: &[Found]) -> Vec<StudyLine> {
+    let points = |wanted: &dyn Fn(&str) -> bool| {
+        let found = rows.iter().filter(|(name, ..)| wanted(name));
+        found.map(|(_, q, ms, ..)| [*ms, q.psnr_db()]).collect::<Vec<_>>()
+    };
+    let is_rays = |name: &str| name.starts_with("rt-");
+    let is_best = |name: &str| name.ends_with("best sampler");
+    let mut lines = vec![
+        line("rt-16 and 48", points(&|name| is_rays(name) && !is_best(name))),
+        line("rt-16 and 48, best sampler", points(&|name| is_rays(name) && is_best(name))),
+    ];
+    let others = rows.iter().filter(|(name, ..)| !is_rays(name));
+    lines.extend(others.map(|(name, q, ms, ..)| line(name.clone(), [[*ms, q.psnr_db()]])));
+    lines
+}
+
 impl Study for LightMethods {
     fn title(&self) -> &'static str {
         "Direct light, every method"
@@ -64,7 +84,7 @@ impl Study for LightMethods {
         let stage = lit.stage;
         let size = lit.size();
         let count = stage.frame_times_s.len();
-        let mut rows: Vec<(String, Quality, f64, f64, f64)> = Vec::new();
+        let mut rows: Vec<Found> = Vec::new();
         for (number, &time_s) in stage.frame_times_s.iter().enumerate() {
             let mut runs = techniques()
                 .into_iter()
@@ -131,7 +151,7 @@ impl Study for LightMethods {
             title: "Quality by time".to_owned(),
             x: axis("time here", "ms", true),
             y: axis("PSNR", "dB", false),
-            lines: rows.iter().map(|(name, q, ms, ..)| line(name.clone(), [[*ms, q.psnr_db()]])).collect(),
+            lines: lines(&rows),
         };
         let notes = vec![format!(
             "{count} pictures of {} × {} pixels, each after {} steps of a server at 15 Hz along the path; truth {} samples a pixel. Times of lighting alone, the median of the last {WATCHED} steps, methods in turn.",
