@@ -27,7 +27,7 @@ fn is_sheet(name: &str) -> bool {
 #[test]
 fn bytes_layout_and_triangle_counts_are_as_promised() {
     let hash = "";
-    document::assert_promises("village", DETAIL, hash, 200_000..=500_000, 30_000..=90_000);
+    document::assert_promises("village", DETAIL, hash, 400_000..=600_000, 70_000..=120_000);
 }
 
 #[test]
