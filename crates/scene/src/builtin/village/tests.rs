@@ -125,7 +125,7 @@ fn what_stands_on_the_ground_reaches_into_it() {
             }
             let u = (p - flat[0]).perp_dot(flat[2] - flat[0]) / area;
             let v = (flat[1] - flat[0]).perp_dot(p - flat[0]) / area;
-            (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| a.y + (b.y - a.y) * u + (c.y - a.y) * v)
+            (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then_some(a.y + (b.y - a.y) * u + (c.y - a.y) * v)
         };
         land.triangles.iter().find_map(inside)
     };
