@@ -56,7 +56,7 @@ pub(super) fn body(detail: Detail, lamp: Lamp) -> Things {
                     k.turned(Chrome, Vec3::ZERO, &cap, 20);
                 }
                 _ => {
-                    let back = -BELOW + 0.012;
+                    let back = -BELOW + 0.004;
                     k.bar(Chrome, &[p(0.0, -0.05, 0.0), p(0.0, back + 0.01, 0.0)], 0.02, 10);
                     if lamp == Lamp::Disc {
                         k.turned(

@@ -185,7 +185,7 @@ pub(super) fn services(detail: Detail) -> Things {
             let line = s * (z - 0.55);
             let y = 5.6 + 0.28 * i as f32;
             k.bar(stuff, &[p(-x, y, line), p(x, y, line)], r, 12);
-            for j in 0..9 {
+            for j in 0..detail.count(9, 3) {
                 k.flange(DarkSteel, p(-16.0 + 4.0 * j as f32 + 0.6, y, line), Vec3::X, r);
             }
         }
@@ -233,7 +233,7 @@ pub(super) fn services(detail: Detail) -> Things {
         }
         // Drains.
         k.plain(DarkSteel, [-18.5, -0.02, s * 7.6 - 0.12], [18.5, 0.003, s * 7.6 + 0.12]);
-        let bars = detail.count(184, 46);
+        let bars = detail.count(184, 26);
         for i in 0..bars {
             let at = -18.4 + 36.8 * (i as f32 + 0.5) / bars as f32;
             k.plain(Steel, [at - 0.03, -0.01, s * 7.6 - 0.1], [at + 0.03, 0.01, s * 7.6 + 0.1]);

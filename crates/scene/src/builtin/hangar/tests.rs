@@ -26,7 +26,7 @@ fn is_sheet(name: &str) -> bool {
 #[test]
 fn bytes_layout_and_triangle_counts_are_as_promised() {
     let hash = "";
-    document::assert_promises("hangar", DETAIL, hash, 150_000..=400_000, 20_000..=90_000);
+    document::assert_promises("hangar", DETAIL, hash, 200_000..=300_000, 40_000..=65_000);
 }
 
 #[test]

@@ -63,6 +63,8 @@ fn glazing(k: &mut Things, of: Stuff, o: Opening, [y0, y1]: [f32; 2], [across, u
     ] {
         bar(k, a, b);
     }
+    // The finest bars are left out at low detail.
+    let [across, up] = if k.fine() { [across, up] } else { [across.min(2), 1] };
     for i in 1..across {
         let x = x0 + o.wide * i as f32 / across as f32;
         k.plain(of, [x - 0.025, y0 + w, -PANE_DEPTH - 0.02], [x + 0.025, y1 - w, -PANE_DEPTH + 0.04]);
@@ -91,6 +93,10 @@ fn shutters(k: &mut Things, of: Stuff, o: Opening, [y0, y1]: [f32; 2]) {
         let inner = o.at + s * (0.5 * o.wide + 0.15);
         let (a, b) = (inner.min(inner + s * leaf), inner.max(inner + s * leaf));
         let (z0, z1) = (0.03, 0.075);
+        if !k.fine() {
+            k.plain(of, [a, y0, z0], [b, y1, z1]);
+            continue;
+        }
         for (x0, x1) in [(a, a + 0.06), (b - 0.06, b)] {
             k.plain(of, [x0, y0, z0], [x1, y1, z1]);
         }
@@ -271,8 +277,10 @@ fn flower_box(k: &mut Things, o: Opening, sill: f32, seed: u32) {
 
 /// Stones at the corners, longer and shorter by turns.
 fn quoins(k: &mut Things, half: f32, top: f32) {
-    let count = libm::floorf((top - GROUND_FLOOR - 0.2) / 0.45) as u32;
-    for i in 0..count {
+    let rows = libm::floorf((top - GROUND_FLOOR - 0.2) / 0.45) as u32;
+    // At low detail only the longer ones.
+    let step = if k.fine() { 1 } else { 2 };
+    for i in (0..rows).step_by(step) {
         let y = GROUND_FLOOR + 0.06 + 0.45 * i as f32;
         let long = if i % 2 == 0 { 0.46 } else { 0.28 };
         for s in [-1.0_f32, 1.0] {

@@ -49,7 +49,7 @@ pub(super) struct Palette(Vec<MaterialId>);
 /// Radiances: each light gives about 1 lx at 4 m.
 const WARM: Vec3 = Vec3::new(140.0, 90.0, 43.0);
 const COOL: Vec3 = Vec3::new(110.0, 172.0, 214.0);
-const CUBE: Vec3 = Vec3::new(100.0, 43.0, 77.0);
+const CUBE: Vec3 = Vec3::new(86.0, 54.0, 70.0);
 
 impl Palette {
     /// Adds all materials, their textures and normal maps.

@@ -224,7 +224,7 @@ pub(super) fn well(detail: Detail) -> Things {
 /// A market stall's posts, counter and goods; the cloth is [`awning`].
 pub(super) fn stall(detail: Detail) -> Things {
     let mut k: Things = Kit::new(detail);
-    for (x, z, top) in [(-1.3, -0.7, 2.5), (1.3, -0.7, 2.5), (-1.3, 0.7, 2.1), (1.3, 0.7, 2.1)] {
+    for (x, z, top) in [(-1.3, -0.7, 2.45), (1.3, -0.7, 2.45), (-1.3, 0.7, 2.05), (1.3, 0.7, 2.05)] {
         k.bar(Oak, &[p(x, -0.4, z), p(x, top, z)], 0.05, 10);
     }
     for (z, y) in [(-0.7, 2.44), (0.7, 2.04)] {
@@ -306,9 +306,11 @@ pub(super) fn awning(detail: Detail) -> Geometry {
     let [nx, nz] = [detail.facets(24, 6), detail.facets(12, 4)];
     let surface = |s: f32, t: f32| {
         let x = 3.0 * (s - 0.5);
-        let sag = 0.11 * libm::sinf(std::f32::consts::PI * t) * (0.6 + 0.4 * libm::sinf(TAU * s * 2.0));
+        let sag = 0.09
+            * libm::sinf(std::f32::consts::PI * (t / 0.9).min(1.0))
+            * (0.6 + 0.4 * libm::sinf(TAU * s * 2.0));
         let hem = if t > 0.9 { 1.6 * (t - 0.9) } else { 0.0 };
-        p(x, 2.5 - 0.4 * t.min(0.9) / 0.9 - sag - hem, -0.72 + 1.46 * t.min(0.9) / 0.9 + 0.3 * hem)
+        p(x, 2.56 - 0.4 * t.min(0.9) / 0.9 - sag - hem, -0.72 + 1.46 * t.min(0.9) / 0.9 + 0.3 * hem)
     };
     for j in 0..=nz {
         for i in 0..=nx {

@@ -106,7 +106,7 @@ pub(super) fn fir(seed: u32, detail: Detail) -> [Geometry; 2] {
         &bough(&[Vec3::Y * -0.4, Vec3::Y * 2.5, Vec3::Y * height], [0.2, 0.02], detail.facets(10, 5)),
         Vec3::ZERO,
     );
-    let whorls = detail.facets(13, 7);
+    let whorls = detail.facets(13, 5);
     for w in 0..whorls {
         let t = (w as f32 + 0.5) / whorls as f32;
         let y = 0.9 + (height - 1.2) * t;
@@ -120,7 +120,7 @@ pub(super) fn fir(seed: u32, detail: Detail) -> [Geometry; 2] {
             let long = reach * (0.82 + 0.3 * r(1));
             // A bough droops and lifts its tip; sprays stand along both of its sides.
             let curve = |s: f32| Vec3::Y * (y - 0.42 * long * s + 0.2 * long * s * s) + out * (long * s);
-            let sprays = detail.facets(6, 3);
+            let sprays = detail.facets(6, 2);
             let wide = 6.0 / sprays as f32;
             for k in 0..sprays {
                 let s = (k as f32 + 0.7) / sprays as f32;
