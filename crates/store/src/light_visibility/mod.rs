@@ -199,7 +199,10 @@ mod tests {
     fn values_are_kept_by_light_and_bad_ones_are_refused() {
         let layout = layout(3);
         let mut held = LightVisibility::new(&layout, 2, vec![0, 1, 2, 29, 30, 31]).unwrap();
-        assert_eq!((held.get(1, 1), held.get(2, 0), held.get(3, 0), held.get(0, 2)), (Some(30), Some(2), None, None));
+        assert_eq!(
+            (held.get(1, 1), held.get(2, 0), held.get(3, 0), held.get(0, 2)),
+            (Some(30), Some(2), None, None)
+        );
         assert_eq!(held.fraction(2, 1), Some(1.0));
         let before = (held.clone(), held.hash());
         let bad = [LightChange { index: 0, new: 9 }, LightChange { index: 6, new: 0 }];

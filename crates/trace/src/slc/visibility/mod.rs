@@ -3,6 +3,9 @@
 //! A value is the share of a light's unoccluded irradiance that arrives. A point draws the same places of a light at every moment, so what
 //! changes of a value is what moved, not which rays were drawn.
 
+#[cfg(test)]
+mod tests;
+
 use dapple_scene::area_lights::{AreaLights, luminance};
 use dapple_scene::glam::Vec3;
 use dapple_store::light_visibility::{LightChange, LightVisibility, LightVisibilityError, OPEN, quantized};
@@ -125,7 +128,9 @@ pub fn update_visibility(
         let start = light * values.points();
         for (list, chunk) in &found {
             counts = counts.add(*chunk);
-            for &(point, new) in list.iter().filter(|(point, new)| before.get(*point).is_some_and(|b| b != new)) {
+            for &(point, new) in
+                list.iter().filter(|(point, new)| before.get(*point).is_some_and(|b| b != new))
+            {
                 changed.push(LightChange { index: (start + point) as u32, new });
             }
         }
@@ -190,7 +195,8 @@ impl Worker {
     ) -> Option<u8> {
         let most = params.rays.clamp(1, MAX_DIRECTIONS as u32);
         let origin = offset_origin(site.position_world, site.normal_world);
-        let name = u64::from(hash(site.key, light as u64, 0)) << 32 | u64::from(hash(site.key, light as u64, 1));
+        let name =
+            u64::from(hash(site.key, light as u64, 0)) << 32 | u64::from(hash(site.key, light as u64, 1));
         let draws = Draws::new(Sequence::Lattice, params.seed, name, 0, 1);
         let (mut all, mut seen, mut next) = (0.0f32, 0.0f32, 0);
         let mut sent = 0;
