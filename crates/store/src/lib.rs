@@ -6,5 +6,6 @@
 pub mod cells;
 pub mod charts;
 pub mod cones;
+pub mod light_visibility;
 mod octahedral;
 pub mod points;

@@ -12,7 +12,7 @@ mod columns;
 mod decode;
 #[cfg(feature = "publish")]
 mod encode;
-mod entropy;
+pub(crate) mod entropy;
 mod frame;
 mod plane;
 mod planes;
@@ -33,12 +33,15 @@ pub(crate) use planes::{PLANES, planes};
 #[cfg(feature = "publish")]
 pub(crate) use sets::sets_head;
 pub(crate) use sets::{DecodedSets, decode_sets_change};
+pub(crate) use values::{BLOCK, Back, Near, SHARES, Scratch, code_values};
 #[cfg(feature = "publish")]
 pub(crate) use values::{Fit, Goal, LEAF, Tolerances};
-pub(crate) use values::{Near, Scratch};
 pub use values::{ValueChange, first_chances};
 
 use dapple_store::points::LayoutError;
+
+/// Most bits of a coordinate within its cell: they are coded as one byte.
+pub(crate) const MAX_LOCAL_BITS: u32 = 8;
 
 /// What a receiver is willing to take. Every allocation of a decoder is bounded by these, whatever the bytes say:
 /// at most 64 bytes for each of `max_points`, 256 for each of `max_sets`, 32 for each of `max_cuts`, and 8 MiB.

@@ -14,6 +14,7 @@
 #[cfg(feature = "cells")]
 pub mod cells;
 pub mod codec;
+pub mod light_visibility;
 pub mod recording;
 pub mod session;
 

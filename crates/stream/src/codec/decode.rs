@@ -6,6 +6,7 @@ use dapple_store::charts::{Cuts, SetCuts, SiteCut};
 use dapple_store::points::{MAX_POINTS, PointLayout, PointSet, PointStore};
 use glam::Vec3;
 
+use super::MAX_LOCAL_BITS;
 use super::columns::{CutColumns, PointColumns};
 use super::entropy::{self, Coder};
 use super::planes::{Changes, HAS_BENT, PLANES, planes};
@@ -52,7 +53,7 @@ pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<DecodedLayo
     let spacing_m = reader.f32("layout lengths")?;
     let flags = reader.byte("layout local bits")?;
     let (local_bits, has_bent) = (u32::from(flags & !HAS_BENT), flags & HAS_BENT != 0);
-    if local_bits > 8 {
+    if local_bits > MAX_LOCAL_BITS {
         return Err(bad("layout local bits", "exceed 8"));
     }
     let (mut sets, counts) = decode_sets(&mut reader, limits)?;

@@ -3,14 +3,12 @@
 use dapple_store::charts::Cuts;
 use dapple_store::points::{PointLayout, PointStore};
 
+use super::MAX_LOCAL_BITS;
 use super::columns::{CutColumns, PointColumns};
 use super::entropy::Writer;
 use super::planes::{Changes, HAS_BENT, PLANES, planes};
 use super::values::{Fit, Goal, Near, Scratch, code_changes, code_values};
 use super::varint::write_varint;
-
-/// Most bits of a coordinate within its cell: they are coded as one byte.
-const MAX_LOCAL_BITS: u32 = 8;
 
 /// The layout part of a snapshot with the cuts that belong to it.
 #[derive(Clone, Debug)]

@@ -88,11 +88,23 @@ impl<'a> Changes<'a> {
         &self.lights
     }
 
+    /// Whether an instance moved or bent.
+    pub(super) fn has_moved(&self, instance: u32) -> bool {
+        self.moved.get(instance as usize).is_some_and(|moved| *moved)
+    }
+
+    /// Whether another part of a light than before may be seen from a place that did not move.
+    pub(super) fn may_show(&self, light: usize, position: Vec3, normal: Vec3) -> bool {
+        !self.nothing
+            && (self.lights.get(light).is_some_and(|changed| *changed)
+                || self.covered(light, position, normal) > 0.0)
+    }
+
     pub(super) fn of(&self, place: &EntryPlace, instance: u32) -> Change {
         if self.nothing {
             return Change::default();
         }
-        if self.moved.get(instance as usize).is_some_and(|moved| *moved) {
+        if self.has_moved(instance) {
             return Change { share: 1.0, hidden: true, new: 0.0 };
         }
         let (position, normal) = (place.position_world, place.normal_world);

@@ -4,6 +4,8 @@
 //!   [`ConeCache`]
 //! - returns: entries of the cache updated, and how many rays that took
 //!
+//! And, for clients that know where lights are: how much of each light points see ([`trace_visibility`]).
+//!
 //! Equations, deviations and parameters in `README.md`.
 
 mod changes;
@@ -11,6 +13,7 @@ mod paper;
 mod places;
 #[cfg(test)]
 mod tests;
+mod visibility;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -24,6 +27,9 @@ use crate::sampling::hash;
 pub use changes::{Changes, Moment};
 pub use paper::{PaperParams, update_bounding_cones};
 pub use places::{EntryPlace, EntryPlaces};
+pub use visibility::{
+    VisibilityCounts, VisibilityParams, VisibleError, trace_visibility, update_visibility, value_tolerances,
+};
 
 /// Most samples of an entry in one update.
 pub const MAX_SAMPLES: u32 = 256;

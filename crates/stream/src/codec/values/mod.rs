@@ -15,6 +15,6 @@ pub use delta::ValueChange;
 pub(crate) use delta::{Guide, MOST_FOLLOW, Scale, Scratch, code_changes};
 #[cfg(feature = "publish")]
 pub(crate) use goal::{Fit, Goal, Tolerances};
-pub(crate) use near::Near;
+pub(crate) use near::{BLOCK, Back, Near, SHARES};
 pub(crate) use snapshot::code_values;
 pub use start::first_chances;

@@ -1,0 +1,281 @@
+//! How much of each light is seen from each point of a layout, and which of it has to be found again from one moment to the next.
+//!
+//! A value is the share of a light's unoccluded irradiance that arrives. A point draws the same places of a light at every moment, so what
+//! changes of a value is what moved, not which rays were drawn.
+
+#[cfg(test)]
+mod tests;
+
+use dapple_scene::area_lights::{AreaLights, luminance};
+use dapple_scene::glam::Vec3;
+use dapple_store::light_visibility::{LightChange, LightVisibility, LightVisibilityError, OPEN, quantized};
+use dapple_store::points::PointLayout;
+use rayon::prelude::*;
+
+use super::Changes;
+use crate::bvh::{MAX_DIRECTIONS, Tracer, offset_origin};
+use crate::direct::{Draws, Sequence};
+use crate::rtao::Site;
+use crate::sampling::hash;
+
+/// Draws for one ray at the most: places that are turned away or below the horizon cost a draw, and no ray.
+const DRAWS_PER_RAY: u32 = 4;
+
+/// Points of a task.
+const CHUNK: usize = 256;
+
+/// How the visibility of lights is traced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct VisibilityParams {
+    /// Rays from a point to a light, 1 … 256 (brought into that range), default 16.
+    pub rays: u32,
+    /// If so many first rays agree, the others are not sent; default 4. At least `rays`: all are always sent.
+    pub first: u32,
+    /// Seed of the places on lights, default 0.
+    pub seed: u64,
+}
+
+impl Default for VisibilityParams {
+    fn default() -> Self {
+        VisibilityParams { rays: 16, first: 4, seed: 0 }
+    }
+}
+
+/// What it took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct VisibilityCounts {
+    /// Pairs of a point and a light that were looked at again.
+    pub traced: u64,
+    /// Of these, whose value is another.
+    pub changed: u64,
+    /// Rays.
+    pub rays: u64,
+}
+
+impl VisibilityCounts {
+    fn add(self, other: VisibilityCounts) -> VisibilityCounts {
+        VisibilityCounts {
+            traced: self.traced + other.traced,
+            changed: self.changed + other.changed,
+            rays: self.rays + other.rays,
+        }
+    }
+}
+
+/// Finds all values, in parallel in the caller's rayon pool. `sites` are the points of `layout`, in its order, as
+/// [`GeneratedPoints::sites_world`](crate::psao::generate::GeneratedPoints::sites_world) has them; missing ones count as points without any.
+///
+/// A point that a light does not reach takes over the value of the point before it, which costs next to nothing to send.
+///
+/// # Errors
+/// More points and lights than fit.
+pub fn trace_visibility(
+    layout: &PointLayout,
+    sites: &[Option<Site>],
+    tracer: &Tracer,
+    lights: &AreaLights<'_>,
+    params: &VisibilityParams,
+) -> Result<(LightVisibility, VisibilityCounts), LightVisibilityError> {
+    let count = u32::try_from(lights.len()).unwrap_or(u32::MAX);
+    // Refuses what is too much before anything is traced.
+    let open = LightVisibility::open(layout, count)?;
+    let mut values = open.values().to_vec();
+    let mut counts = VisibilityCounts::default();
+    for (light, plane) in values.chunks_mut(layout.len().max(1)).enumerate() {
+        let found = trace_light(sites, (light, lights), tracer, params, |_, _| true);
+        counts = found.iter().fold(counts, |sum, chunk| sum.add(chunk.1));
+        let mut found = found.iter().flat_map(|chunk| &chunk.0).peekable();
+        let mut last = OPEN;
+        for (point, value) in plane.iter_mut().enumerate() {
+            if let Some((_, new)) = found.next_if(|(at, _)| *at == point) {
+                last = *new;
+            }
+            *value = last;
+        }
+    }
+    Ok((LightVisibility::new(layout, count, values)?, counts))
+}
+
+/// Finds again what may be another than at the moment before: lights that moved, lights that something may have moved in front of or away from,
+/// and points that moved. What a light does not reach stays. Gives the changes, which `values` has already.
+///
+/// `sites` are of the present moment. Values of another layout or other lights are the caller's mistake; what has no place is left out.
+pub fn update_visibility(
+    values: &mut LightVisibility,
+    (layout, sites): (&PointLayout, &[Option<Site>]),
+    tracer: &Tracer,
+    changes: &Changes<'_>,
+    params: &VisibilityParams,
+) -> (Vec<LightChange>, VisibilityCounts) {
+    let mut counts = VisibilityCounts::default();
+    let mut changed = Vec::new();
+    if changes.is_nothing() || values.points() != layout.len() {
+        return (changed, counts);
+    }
+    let mut has_moved = vec![false; layout.len()];
+    for set in layout.sets() {
+        let first = set.first as usize;
+        has_moved[first..first + set.len()].fill(changes.has_moved(set.instance));
+    }
+    let lights = changes.lights();
+    for light in 0..lights.len().min(values.lights() as usize) {
+        let is_due = |point: usize, site: &Site| {
+            has_moved.get(point) == Some(&true)
+                || changes.may_show(light, site.position_world, site.normal_world)
+        };
+        let found = trace_light(sites, (light, lights), tracer, params, is_due);
+        let before = values.of_light(light as u32);
+        let start = light * values.points();
+        for (list, chunk) in &found {
+            counts = counts.add(*chunk);
+            for &(point, new) in
+                list.iter().filter(|(point, new)| before.get(*point).is_some_and(|b| b != new))
+            {
+                changed.push(LightChange { index: (start + point) as u32, new });
+            }
+        }
+    }
+    counts.changed = changed.len() as u64;
+    // All of these are there: they were compared with what is.
+    let applied = values.apply(&changed);
+    debug_assert!(applied.is_ok());
+    (changed, counts)
+}
+
+/// What one task found: points and their values, in order.
+type Found = (Vec<(usize, u8)>, VisibilityCounts);
+
+/// Values of one light at those points that it reaches and that are due.
+fn trace_light(
+    sites: &[Option<Site>],
+    (light, lights): (usize, &AreaLights<'_>),
+    tracer: &Tracer,
+    params: &VisibilityParams,
+    is_due: impl Fn(usize, &Site) -> bool + Sync,
+) -> Vec<Found> {
+    let chunk = |(chunk, sites): (usize, &[Option<Site>])| {
+        let (mut list, mut counts) = (Vec::new(), VisibilityCounts::default());
+        let mut worker = Worker::default();
+        for (i, site) in sites.iter().enumerate() {
+            let point = chunk * CHUNK + i;
+            let Some(site) = site.as_ref().filter(|site| is_usable(site)) else { continue };
+            if lights.arriving(light, site.position_world, site.normal_world) <= 0.0 || !is_due(point, site) {
+                continue;
+            }
+            if let Some(value) = worker.value(tracer, (light, lights), site, params, &mut counts.rays) {
+                counts.traced += 1;
+                list.push((point, value));
+            }
+        }
+        (list, counts)
+    };
+    sites.par_chunks(CHUNK).enumerate().map(chunk).collect()
+}
+
+fn is_usable(site: &Site) -> bool {
+    site.position_world.is_finite() && site.normal_world.is_finite() && site.normal_world != Vec3::ZERO
+}
+
+/// Buffers of one task.
+#[derive(Default)]
+struct Worker {
+    reaches: Vec<Vec3>,
+    shares: Vec<f32>,
+}
+
+impl Worker {
+    /// The value of a light at a point; `None` if no place of the light was found that could shine there.
+    fn value(
+        &mut self,
+        tracer: &Tracer,
+        (light, lights): (usize, &AreaLights<'_>),
+        site: &Site,
+        params: &VisibilityParams,
+        rays: &mut u64,
+    ) -> Option<u8> {
+        let most = params.rays.clamp(1, MAX_DIRECTIONS as u32);
+        let origin = offset_origin(site.position_world, site.normal_world);
+        let name =
+            u64::from(hash(site.key, light as u64, 0)) << 32 | u64::from(hash(site.key, light as u64, 1));
+        let draws = Draws::new(Sequence::Lattice, params.seed, name, 0, 1);
+        let (mut all, mut seen, mut next) = (0.0f32, 0.0f32, 0);
+        let mut sent = 0;
+        for goal in [params.first.clamp(1, most), most] {
+            self.reaches.clear();
+            self.shares.clear();
+            while sent < goal && next < most * DRAWS_PER_RAY {
+                let sample = lights.sample_light(light as u32, origin, draws.at(next));
+                next += 1;
+                let Some(sample) = sample else { continue };
+                let cosine = site.normal_world.dot(sample.to_light_world);
+                let share = cosine * luminance(sample.radiance) / sample.density_per_sr;
+                if share > 0.0 && share.is_finite() {
+                    self.reaches.push(sample.reach());
+                    self.shares.push(share);
+                    sent += 1;
+                }
+            }
+            let blocked = tracer.occlusion(origin, &self.reaches, 1.0);
+            *rays += self.reaches.len() as u64;
+            for (i, share) in self.shares.iter().enumerate() {
+                all += share;
+                if blocked[i / 64] >> (i % 64) & 1 == 0 {
+                    seen += share;
+                }
+            }
+            if seen == 0.0 || seen == all {
+                break;
+            }
+        }
+        (all > 0.0 && all.is_finite()).then(|| quantized(seen / all))
+    }
+}
+
+/// From which error on one sees that a value is not the right one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VisibleError {
+    /// Share of the irradiance at a point, ≥ 0, default 0.1.
+    pub relative: f32,
+    /// Irradiance (luminance, W/m²) that is added to that at a point before the share is taken, ≥ 0, default 0: what is small against it is as
+    /// good as black.
+    pub floor: f32,
+}
+
+impl Default for VisibleError {
+    fn default() -> Self {
+        VisibleError { relative: 0.1, floor: 0.0 }
+    }
+}
+
+/// By how many steps each value may be off before the error is seen, light by light as the values are; 255 where its light does not matter.
+pub fn value_tolerances(
+    values: &LightVisibility,
+    sites: &[Option<Site>],
+    lights: &AreaLights<'_>,
+    error: &VisibleError,
+) -> Vec<u8> {
+    let (points, count) = (values.points(), values.lights() as usize);
+    let arriving = |light: usize, point: usize| {
+        let site = sites.get(point).and_then(|site| site.as_ref()).filter(|site| is_usable(site));
+        site.map_or(0.0, |site| lights.arriving(light, site.position_world, site.normal_world))
+    };
+    let steps = f32::from(OPEN);
+    let irradiance: Vec<f32> = (0..points)
+        .into_par_iter()
+        .map(|point| {
+            let of = |light: usize| {
+                arriving(light, point) * f32::from(values.of_light(light as u32)[point]) / steps
+            };
+            (0..count).map(of).sum()
+        })
+        .collect();
+    let tolerance = |index: usize| {
+        let (light, point) = (index / points, index % points);
+        let may = steps * error.relative * (irradiance[point] + error.floor);
+        match arriving(light, point) {
+            most if most > 0.0 => (may / most).clamp(0.0, 255.0) as u8,
+            _ => 255,
+        }
+    };
+    (0..points * count).into_par_iter().map(tolerance).collect()
+}
