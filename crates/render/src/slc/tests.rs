@@ -1,3 +1,5 @@
+//! Shading with cones against sums over their directions.
+
 use std::f32::consts::{FRAC_1_PI, TAU};
 
 use dapple_scene::{Reflectance, ShadingPoint};

@@ -1,3 +1,5 @@
+//! Lights against closed forms, and against what their samplers say of themselves.
+
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{Affine3A, Mat3, Vec2, Vec3};

@@ -1,3 +1,5 @@
+//! What was published is what arrives, and any bytes are survived.
+
 use dapple_store::points::{PackedNormal, PointSet, morton_code};
 use proptest::prelude::*;
 

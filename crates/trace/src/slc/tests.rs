@@ -1,3 +1,5 @@
+//! Entries against closed forms, still and while something changes.
+
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 

@@ -1,3 +1,5 @@
+//! Visibility of lights at points against closed forms, and what is traced again.
+
 use std::sync::Arc;
 
 use dapple_scene::glam::Affine3A;
