@@ -112,6 +112,10 @@ impl<S: Copy + PartialEq> Kit<S> {
 
     /// A crate of 0.8 m about the middle of its underside: boards in a frame, braced.
     pub(super) fn crate_box(&mut self, [boards, frame]: [S; 2]) {
+        if !self.fine() {
+            self.plain(boards, [-0.4, 0.0, -0.4], [0.4, 0.8, 0.4]);
+            return;
+        }
         self.plain(boards, [-0.37, 0.01, -0.37], [0.37, 0.78, 0.37]);
         for s in [-1.0_f32, 1.0] {
             for y in [0.0, 0.35, 0.7] {

@@ -113,7 +113,7 @@ pub enum BuiltinError {
 
 /// Makes a built-in scene as a GLB that any glTF 2.0 viewer opens.
 ///
-/// `detail` in 0 … 1 (0 excluded) scales the number of triangles: 1 is full detail, 0.1 an eighth to a fifth of it, for tests. The layout,
+/// `detail` in 0 … 1 (0 excluded) scales the number of triangles: 1 is full detail, 0.1 an eighth to a quarter of it, for tests. The layout,
 /// the animation, the lights and the cameras are the same at every detail.
 ///
 /// # Errors

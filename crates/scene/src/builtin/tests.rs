@@ -4,16 +4,68 @@ pub(super) mod document;
 
 use glam::{Mat4, Vec2, Vec3};
 
-use super::builder::{GlbBuilder, Influences, MaterialSpec, NodeSpec, Track};
+use super::builder::{Emitter, GlbBuilder, Influences, MaterialSpec, NodeSpec, Track};
 use super::shapes::{self, Geometry};
 use super::{BUILTINS, BuiltinError, glb};
 
 #[test]
-fn every_listed_scene_is_made() {
+fn every_listed_scene_is_made_and_none_is_another() {
+    let mut known = std::collections::BTreeSet::new();
     for builtin in BUILTINS {
         let bytes = glb(builtin.name, 0.1).expect("a listed scene");
         gltf::Gltf::from_slice(&bytes).expect("valid glTF");
+        assert!(known.insert(blake3::hash(&bytes).to_hex()), "{} is as another scene", builtin.name);
     }
+    assert_eq!(known.len(), BUILTINS.len());
+}
+
+#[test]
+fn nodes_name_the_shape_that_their_mesh_stands_for() {
+    let mut b = GlbBuilder::new();
+    let glow = b.material("glow", &super::emitters::glow(Vec3::splat(50.0)));
+    let mesh = b.mesh("disc", &[(&super::emitters::disc(super::Detail(1.0), 0.5), glow)]);
+    for emitter in [Emitter::Sphere, Emitter::Disc, Emitter::Rectangle] {
+        b.node(emitter.name(), &NodeSpec { emitter: Some(emitter), ..NodeSpec::mesh_at(mesh, Vec3::Y, 0.0) });
+    }
+    let spec =
+        NodeSpec { emitter: Some(Emitter::Disc), casts: false, receives: false, ..NodeSpec::default() };
+    b.node("all", &NodeSpec { mesh: Some(mesh), ..spec });
+    let bytes = b.finish().expect("written");
+    let gltf = gltf::Gltf::from_slice(&bytes).expect("valid glTF");
+    let extras: Vec<String> =
+        gltf.nodes().map(|n| n.extras().as_ref().map(|e| e.get().to_string()).unwrap_or_default()).collect();
+    assert_eq!(
+        extras,
+        [
+            r#"{"light":"sphere"}"#,
+            r#"{"light":"disc"}"#,
+            r#"{"light":"rectangle"}"#,
+            r#"{"casts":false,"receives":false,"light":"disc"}"#
+        ]
+    );
+    assert!(gltf.extensions_used().any(|name| name == "KHR_materials_emissive_strength"));
+    let scene = crate::load("lamps.glb", &bytes, &crate::NoFiles).expect("loads");
+    assert_eq!(scene.materials[0].emissive_factor, Vec3::splat(50.0));
+    // A fan of 64 triangles, flat, towards −Z.
+    let disc = &scene.meshes[0];
+    assert_eq!(disc.triangles.len(), 64);
+    for t in &disc.triangles {
+        let [a, b, c] = t.map(|v| disc.positions[v as usize]);
+        assert!((b - a).cross(c - a).z < 0.0);
+    }
+}
+
+#[test]
+fn loops_are_closed_and_even() {
+    let corners = [Vec3::ZERO, Vec3::new(4.0, 0.0, 0.0), Vec3::new(4.0, 1.0, 3.0), Vec3::new(0.0, 2.0, 3.0)];
+    let points = super::path::even_loop(&corners, 120);
+    assert_eq!((points.len(), points[0]), (121, points[120]));
+    let steps: Vec<f32> = points.windows(2).map(|pair| pair[0].distance(pair[1])).collect();
+    let mean = steps.iter().sum::<f32>() / steps.len() as f32;
+    assert!(mean > 0.02 && steps.iter().all(|step| (step / mean - 1.0).abs() < 0.01), "{steps:?}");
+    // It bends at its ends as anywhere else.
+    let (before, after) = (points[120] - points[119], points[1] - points[0]);
+    assert!(before.normalize().dot(after.normalize()) > 0.99);
 }
 
 #[test]

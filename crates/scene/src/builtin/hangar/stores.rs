@@ -81,6 +81,10 @@ fn containers(detail: Detail) -> Things {
 fn flight_case(detail: Detail, of: Stuff) -> Things {
     let mut k: Things = Kit::new(detail);
     k.plain(of, [-0.34, 0.03, -0.22], [0.34, 0.49, 0.22]);
+    if !k.fine() {
+        k.plain(Rubber, [-0.3, 0.0, -0.19], [0.3, 0.04, 0.19]);
+        return k;
+    }
     for s in [-1.0_f32, 1.0] {
         for e in [-1.0_f32, 1.0] {
             k.plain(Steel, [s * 0.34 - 0.02, 0.02, e * 0.22 - 0.02], [s * 0.34 + 0.02, 0.5, e * 0.22 + 0.02]);

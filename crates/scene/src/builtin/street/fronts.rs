@@ -78,10 +78,12 @@ fn glazing(k: &mut Things, of: Stuff, o: Opening, [y0, y1]: [f32; 2], [across, u
 /// Jambs, a moulded head and a sill around an opening.
 fn surround(k: &mut Things, o: Opening, [y0, y1]: [f32; 2]) {
     let (x0, x1) = (o.at - 0.5 * o.wide, o.at + 0.5 * o.wide);
-    for (a, b) in [(x0 - 0.13, x0), (x1, x1 + 0.13)] {
-        k.plain(Trim, [a, y0, -0.02], [b, y1, 0.045]);
+    if k.fine() {
+        for (a, b) in [(x0 - 0.13, x0), (x1, x1 + 0.13)] {
+            k.plain(Trim, [a, y0, -0.02], [b, y1, 0.045]);
+        }
+        k.plain(Trim, [x0 - 0.13, y1, -0.02], [x1 + 0.13, y1 + 0.16, 0.05]);
     }
-    k.plain(Trim, [x0 - 0.13, y1, -0.02], [x1 + 0.13, y1 + 0.16, 0.05]);
     k.block(Trim, [x0 - 0.2, y1 + 0.15, -0.02], [x1 + 0.2, y1 + 0.24, 0.14], 0.015);
     k.block(Trim, [x0 - 0.17, y0 - 0.1, -WALL + 0.1], [x1 + 0.17, y0, 0.11], 0.012);
 }
@@ -328,7 +330,9 @@ fn roof(k: &mut Things, front: &Front, half: f32, top: f32, openings: &[Opening]
             ([o.at - w + 0.16, y1 - 0.15], [o.at + w - 0.16, y1]),
             ([o.at - 0.03, y0 + 0.1], [o.at + 0.03, y1 - 0.15]),
         ] {
-            k.plain(White, [a[0], a[1], -0.05], [b[0], b[1], 0.05]);
+            if k.fine() {
+                k.plain(White, [a[0], a[1], -0.05], [b[0], b[1], 0.05]);
+            }
         }
         let gable = [[o.at - w - 0.12, y1 - 0.02], [o.at + w + 0.12, y1 - 0.02], [o.at, y1 + 0.5]];
         k.prism(Zinc, &gable, [-1.7, 0.14], &Affine3A::IDENTITY);

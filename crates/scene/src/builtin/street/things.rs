@@ -209,7 +209,9 @@ pub(super) fn string(detail: Detail) -> Things {
     k.bar(Black, &line, 0.009, 6);
     for i in 0..14 {
         let at = sag((i as f32 + 0.5) / 14.0);
-        k.turned(Black, at - Vec3::Y * 0.07, &[[0.02, 0.0], [0.02, 0.06], [0.012, 0.075]], 10);
+        if k.fine() {
+            k.turned(Black, at - Vec3::Y * 0.07, &[[0.02, 0.0], [0.02, 0.06], [0.012, 0.075]], 10);
+        }
         k.turned(
             Glass,
             at - Vec3::Y * 0.16,
