@@ -28,7 +28,8 @@ pub use changes::{Changes, Moment};
 pub use paper::{PaperParams, update_bounding_cones};
 pub use places::{EntryPlace, EntryPlaces};
 pub use visibility::{
-    VisibilityCounts, VisibilityParams, VisibleError, trace_visibility, update_visibility, value_tolerances,
+    VisibilityCounts, VisibilityParams, VisibleError, retrace_visibility, trace_visibility,
+    update_visibility, value_tolerances,
 };
 
 /// Most samples of an entry in one update.

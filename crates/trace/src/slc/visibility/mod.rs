@@ -107,23 +107,43 @@ pub fn update_visibility(
     changes: &Changes<'_>,
     params: &VisibilityParams,
 ) -> (Vec<LightChange>, VisibilityCounts) {
-    let mut counts = VisibilityCounts::default();
-    let mut changed = Vec::new();
-    if changes.is_nothing() || values.points() != layout.len() {
-        return (changed, counts);
+    if changes.is_nothing() {
+        return (Vec::new(), VisibilityCounts::default());
     }
     let mut has_moved = vec![false; layout.len()];
     for set in layout.sets() {
         let first = set.first as usize;
         has_moved[first..first + set.len()].fill(changes.has_moved(set.instance));
     }
-    let lights = changes.lights();
+    let is_due = |light: usize, point: usize, site: &Site| {
+        has_moved.get(point) == Some(&true) || changes.may_show(light, site.position_world, site.normal_world)
+    };
+    trace_due(values, sites, (tracer, changes.lights()), params, is_due)
+}
+
+/// Finds all values again, whatever changed; what a light does not reach stays. Gives the changes, which `values` has already.
+pub fn retrace_visibility(
+    values: &mut LightVisibility,
+    sites: &[Option<Site>],
+    tracer: &Tracer,
+    lights: &AreaLights<'_>,
+    params: &VisibilityParams,
+) -> (Vec<LightChange>, VisibilityCounts) {
+    trace_due(values, sites, (tracer, lights), params, |_, _, _| true)
+}
+
+/// Finds what is due: of which light, at which point.
+fn trace_due(
+    values: &mut LightVisibility,
+    sites: &[Option<Site>],
+    (tracer, lights): (&Tracer, &AreaLights<'_>),
+    params: &VisibilityParams,
+    is_due: impl Fn(usize, usize, &Site) -> bool + Sync,
+) -> (Vec<LightChange>, VisibilityCounts) {
+    let (mut changed, mut counts) = (Vec::new(), VisibilityCounts::default());
     for light in 0..lights.len().min(values.lights() as usize) {
-        let is_due = |point: usize, site: &Site| {
-            has_moved.get(point) == Some(&true)
-                || changes.may_show(light, site.position_world, site.normal_world)
-        };
-        let found = trace_light(sites, (light, lights), tracer, params, is_due);
+        let found =
+            trace_light(sites, (light, lights), tracer, params, |point, site| is_due(light, point, site));
         let before = values.of_light(light as u32);
         let start = light * values.points();
         for (list, chunk) in &found {
