@@ -192,7 +192,10 @@ fn a_still_scene_settles_and_then_takes_no_rays() {
             break;
         }
         steps += 1;
-        assert!(steps <= 8 + 24 * 8, "8 updates of 8 samples, then 8 each 8 frames up to 255");
+        assert!(
+            steps <= 8 + 24 * 8 + 8,
+            "8 updates of 8 samples, then 8 each 8 frames up to 255, then quiet"
+        );
     }
     let entries: Vec<MomentEntry> = cache.ids().map(|id| *cache.entry(id).unwrap()).collect();
     rig.step(&mut cache, &rig.pose, &rig.pose, &params);
