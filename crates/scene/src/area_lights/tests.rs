@@ -248,7 +248,7 @@ fn rays_meet_lights_where_samples_lie_on_them() {
                 );
                 assert_eq!(lights.hit(Vec3::ZERO, -s.to_light_world), None);
             }
-            assert!(found > 100, "{emitter:?}");
+            assert!(found > 50, "{emitter:?}: {found}");
         }
     }
 }
