@@ -5,9 +5,12 @@ use proptest::prelude::*;
 
 use super::*;
 
+/// Cells and normals of points.
+type Points = Vec<([u32; 3], [u8; 2])>;
+
 /// Sheets of points, in Morton order.
 fn layout(sets: Vec<Vec<([u32; 3], [u8; 2])>>) -> Arc<PointLayout> {
-    let set = |(instance, mut points): (usize, Vec<([u32; 3], [u8; 2])>)| {
+    let set = |(instance, mut points): (usize, Points)| {
         points.sort_by_key(|&(position, normal)| (morton_code(position), normal));
         PointSet {
             instance: instance as u32,
