@@ -219,7 +219,7 @@ impl Compared {
 }
 
 /// Rec. 709 luma of sRGB-encoded pixels, 0 … 1.
-fn luma(rgb8: &[[u8; 3]]) -> Vec<f32> {
+pub(crate) fn luma(rgb8: &[[u8; 3]]) -> Vec<f32> {
     let luma_of =
         |&[r, g, b]: &[u8; 3]| 0.2126 * f32::from(r) + 0.7152 * f32::from(g) + 0.0722 * f32::from(b);
     rgb8.iter().map(|p| luma_of(p) / 255.0).collect()

@@ -194,6 +194,50 @@ fn time_camera_and_animation_choose_the_picture() {
 }
 
 #[test]
+fn area_lights_light_a_picture() {
+    let folder = folder();
+    let at = folder.path();
+    std::fs::write(
+        at.join("sky.hdr"),
+        b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n\x80\x80\x80\x82\x80\x80\x80\x82",
+    )
+    .unwrap();
+    std::fs::write(at.join("bad.hdr"), b"no picture").unwrap();
+    let render = |name: &str, arguments: &[&str]| {
+        let common = [
+            "--builtin",
+            "cornell",
+            "--detail",
+            "0.1",
+            "--camera",
+            "path-box",
+            "--size",
+            "48x27",
+            "--method",
+            "none",
+        ];
+        succeed(at, &[&["render"], &common[..], &["-o", name], arguments].concat());
+        let picture = image::open(at.join(name)).unwrap().to_rgb8().into_raw();
+        picture.iter().map(|v| f64::from(*v)).sum::<f64>() / picture.len() as f64
+    };
+    let rays = render("rays.png", &["--direct-light", "rt-64"]);
+    for method in ["slc", "slc-power", "slc-paper", "ris", "restir-di"] {
+        let found = render("other.png", &["--direct-light", method]);
+        assert!((found - rays).abs() < 0.1 * rays, "{method}: {found}, by rays {rays}");
+    }
+    let lit = render("sky.png", &["--direct-light", "rt-16", "--environment", "sky.hdr"]);
+    assert!(lit > rays + 5.0, "{lit}, without a sky {rays}");
+    let lid = |arguments: &[&'static str]| [&["render", "lid.glb", "-o", "out.png"], arguments].concat();
+    fail(at, &lid(&["--direct-light", "slc"]), &["--direct-light", "emits", "--environment"]);
+    fail(at, &lid(&["--direct-light", "torch"]), &["torch", "rt-N", "slc"]);
+    fail(at, &lid(&["--environment", "sky.hdr"]), &["--direct-light"]);
+    fail(at, &lid(&["--direct-light", "slc", "--environment", "bad.hdr"]), &["bad.hdr", ".hdr"]);
+    fail(at, &lid(&["--direct-light", "slc", "--environment", "none.hdr"]), &["none.hdr"]);
+    fail(at, &lid(&["--direct-light", "slc", "--light-steps", "0"]), &["--light-steps", "0"]);
+    assert!(!at.join("out.png").exists());
+}
+
+#[test]
 fn failed_writes_are_told_and_leave_nothing() {
     let folder = folder();
     let at = folder.path();

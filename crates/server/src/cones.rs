@@ -11,11 +11,10 @@ use dapple_scene::glam::Vec3;
 use dapple_scene::{Pose, Scene};
 use dapple_store::charts::{ChartParams, ChartSet, InstanceKey, SceneCharts};
 use dapple_store::cones::{
-    BoundingEntry, CacheParams, Charting, ConeCache, ConeEntry, ConeError, EntryId, LookUp, MomentEntry,
-    Requests, UpdateQueue, View,
+    CacheParams, Charting, ConeCache, ConeError, EntryId, LookUp, Requests, UpdateQueue, View,
 };
 use dapple_trace::Tracer;
-use dapple_trace::slc::{Changes, EntryPlaces, Moment, SlcCounts};
+use dapple_trace::slc::{Changes, EntryPlaces, Moment, SlcCounts, Update};
 
 /// Edge of a chart's texels, metres, at level 0. Texels of the cache are up to 64 times finer.
 pub const CHART_TEXEL_M: f32 = 0.05;
@@ -99,52 +98,6 @@ impl<'a> Now<'a> {
     }
 }
 
-/// How a kind of entry is brought up to date with rays.
-pub trait Update: ConeEntry {
-    /// Its settings.
-    type Params: Sync;
-
-    /// Updates the entries of a queue.
-    fn update(
-        cache: &mut ConeCache<Self>,
-        queue: &UpdateQueue,
-        places: &EntryPlaces,
-        tracer: &Tracer,
-        changes: &Changes<'_>,
-        params: &Self::Params,
-    ) -> SlcCounts;
-}
-
-impl Update for MomentEntry {
-    type Params = dapple_trace::slc::SlcParams;
-
-    fn update(
-        cache: &mut ConeCache<Self>,
-        queue: &UpdateQueue,
-        places: &EntryPlaces,
-        tracer: &Tracer,
-        changes: &Changes<'_>,
-        params: &Self::Params,
-    ) -> SlcCounts {
-        dapple_trace::slc::update_moment_cones(cache, queue, places, tracer, changes, params)
-    }
-}
-
-impl Update for BoundingEntry {
-    type Params = dapple_trace::slc::PaperParams;
-
-    fn update(
-        cache: &mut ConeCache<Self>,
-        queue: &UpdateQueue,
-        places: &EntryPlaces,
-        tracer: &Tracer,
-        changes: &Changes<'_>,
-        params: &Self::Params,
-    ) -> SlcCounts {
-        dapple_trace::slc::update_bounding_cones(cache, queue, places, tracer, changes, params)
-    }
-}
-
 impl<E: Update> ConeServer<E> {
     /// Without entries.
     ///
@@ -179,7 +132,8 @@ impl<E: Update> ConeServer<E> {
         let (lights, lights_before) = (now.lights(now.pose), now.lights(before));
         let then = Moment { scene: now.scene, pose: before, lights: &lights_before };
         let changes = Changes::between(&then, &Moment { pose: now.pose, lights: &lights, ..then });
-        let counts = E::update(&mut self.cache, &self.queue, &self.places, now.tracer, &changes, params);
+        let counts =
+            E::update_queue(&mut self.cache, &self.queue, &self.places, now.tracer, &changes, params);
         pass("rays");
         self.before = Some(now.pose.clone());
         ConeStep {

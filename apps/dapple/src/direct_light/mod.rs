@@ -6,15 +6,38 @@ use anyhow::Result;
 use dapple_render::gbuffer::{GBuffer, rasterize};
 use dapple_render::shade::shading_points;
 use dapple_render::slc::{Caps, Form, Samples, SlcShading, pixel_places, shade_cones};
-use dapple_scene::area_lights::{AreaLights, Pick};
+use dapple_scene::area_lights::{AreaLights, MAX_LIGHT_TRIANGLES, Pick};
 use dapple_scene::glam::Vec3;
-use dapple_scene::{Pose, PosedCamera, Projection, ShadingPoint};
-use dapple_server::cones::{ConeServer, ConeStep, Now, Update};
+use dapple_scene::{Pose, PosedCamera, Projection, Scene, ShadingPoint};
+use dapple_server::cones::{ConeServer, ConeStep, Now, cone_charts};
 use dapple_store::cones::{BoundingEntry, CacheCounts, CacheParams, Charting, LookUp, MomentEntry, View};
 use dapple_trace::direct::{
     DirectParams, NO_PIXEL, Restir, RestirParams, RestirView, RisParams, Sequence, trace_direct, trace_ris,
 };
+use dapple_trace::slc::Update;
 use dapple_trace::slc::{PaperParams, SlcParams};
+
+/// Steps a second of what remembers earlier frames.
+pub(crate) const STEPS_HZ: f64 = 15.0;
+
+/// The charts that cones lie on; what has none is told.
+pub(crate) fn charts(scene: &Scene) -> Charting {
+    let (charting, problems) = cone_charts(scene);
+    for problem in problems {
+        tracing::warn!("{problem}; it carries no cones");
+    }
+    charting
+}
+
+/// Tells of lights that are too much.
+pub(crate) fn warn_of_lights(lights: &AreaLights<'_>) {
+    if lights.left_out() > 0 {
+        tracing::warn!(
+            "{} emitting meshes have more than {MAX_LIGHT_TRIANGLES} triangles; they light nothing",
+            lights.left_out()
+        );
+    }
+}
 
 /// How lights are sampled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -252,7 +275,7 @@ impl Reservoirs {
             });
             let view = RestirView {
                 points: &seen.points,
-                size: [seen.gbuffer.width, seen.gbuffer.height].map(|side| side as usize),
+                size: [seen.gbuffer.width_samples(), seen.gbuffer.height_samples()].map(|side| side as usize),
                 eye_world: seen.camera.eye_world(),
                 previous_pixels: previous.as_deref(),
                 past: None,
@@ -267,10 +290,10 @@ impl Reservoirs {
     }
 }
 
-/// The pixel that showed each pixel's place in the last picture.
+/// The sample that showed each sample's place in the last picture.
 fn previous_pixels(now: &Now<'_>, pose: &Pose, camera: &PosedCamera, gbuffer: &GBuffer) -> Vec<u32> {
     let view_from_world = camera.view_from_world();
-    let (width, height) = (gbuffer.width as f32, gbuffer.height as f32);
+    let (width, height) = (gbuffer.width_samples() as f32, gbuffer.height_samples() as f32);
     gbuffer.map_surfaces(now.scene, pose, |_, surface| {
         let Some(surface) = surface else { return NO_PIXEL };
         let at = view_from_world.transform_point3(surface.position_world);
@@ -281,7 +304,7 @@ fn previous_pixels(now: &Now<'_>, pose: &Pose, camera: &PosedCamera, gbuffer: &G
         let x = (0.5 + 0.5 * at.x / (half * width / height)) * width;
         let y = (0.5 - 0.5 * at.y / half) * height;
         let inside = half > 0.0 && (0.0..width).contains(&x) && (0.0..height).contains(&y);
-        if inside { y as u32 * gbuffer.width + x as u32 } else { NO_PIXEL }
+        if inside { y as u32 * gbuffer.width_samples() + x as u32 } else { NO_PIXEL }
     })
 }
 

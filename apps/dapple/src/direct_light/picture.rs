@@ -8,15 +8,12 @@ use dapple_render::gbuffer::GBuffer;
 use dapple_scene::area_lights::{AreaLights, Environment};
 use dapple_scene::glam::Vec3;
 use dapple_scene::{PosedCamera, Projection, Scene};
-use dapple_server::cones::{Now, cone_charts};
+use dapple_server::cones::Now;
 use dapple_store::cones::Charting;
 use dapple_trace::Tracer;
 
-use super::{Lighter, Sampler, Seen, Technique};
+use super::{Lighter, STEPS_HZ, Sampler, Seen, Technique, charts, warn_of_lights};
 use crate::progress::Bar;
-
-/// Steps a second of what remembers earlier frames.
-const STEPS_HZ: f64 = 15.0;
 
 /// A method for direct light as the command line names it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,18 +59,19 @@ pub(crate) fn add(
     drawn: &mut Drawn,
 ) -> Result<()> {
     let environment = lighting.environment;
-    if AreaLights::new(scene, &drawn.pose).is_empty() && environment.is_none() {
+    let lights = AreaLights::new(scene, &drawn.pose);
+    warn_of_lights(&lights);
+    if lights.is_empty() && environment.is_none() {
         bail!(
             "--direct-light: nothing in {} emits; give it an --environment, or leave the option out",
             scene.name
         );
     }
     let mut lighter = Lighter::new(lighting.technique)?;
-    let charting = if lighter.has_cones() { cone_charts(scene).0 } else { Charting::default() };
+    let charting = if lighter.has_cones() { charts(scene) } else { Charting::default() };
     let steps = if lighter.is_stateless() { 1 } else { lighting.steps.max(1) };
     let bar = Bar::new("direct light", u64::from(steps));
     let mut tracer = Tracer::new(scene, &drawn.pose);
-    let mut found = Vec::new();
     for step in 0..steps {
         let pose = scene.pose(time_s - f64::from(steps - 1 - step) / STEPS_HZ);
         tracer.update(scene, &pose);
@@ -82,7 +80,7 @@ pub(crate) fn add(
         // Places on surfaces are those of the picture, wherever they were.
         let seen = [Seen::of(&now, *camera, drawn.gbuffer.clone())];
         let (mut pictures, _) = lighter.light(&now, &lights, &seen, &charting, &mut |_| ());
-        found = pictures.swap_remove(0);
+        let found = pictures.swap_remove(0);
         if step + 1 == steps {
             for ((direct, lit), point) in drawn.shaded.direct.iter_mut().zip(&found).zip(&seen[0].points) {
                 if let Some(point) = point {
@@ -92,7 +90,6 @@ pub(crate) fn add(
         }
         bar.set(u64::from(step + 1));
     }
-    drop(found);
     if let Some(environment) = environment {
         show(environment, camera, &drawn.gbuffer, &mut drawn.shaded.direct);
     }

@@ -19,13 +19,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use dapple_scene::area_lights::{AreaLights, Chooser, Pick};
 use dapple_scene::glam::Vec3;
-use dapple_store::cones::{ConeCache, ConeSample, MomentEntry, MomentParams, UpdateQueue};
+use dapple_store::cones::{ConeCache, ConeEntry, ConeSample, MomentEntry, MomentParams, UpdateQueue};
 
 use crate::bvh::{Tracer, offset_origin};
 use crate::direct::{Draws, Sequence};
 use crate::sampling::hash;
 pub use changes::{Changes, Moment};
-pub use paper::{PaperParams, update_bounding_cones};
+pub use paper::PaperParams;
 pub use places::{EntryPlace, EntryPlaces};
 pub use visibility::{
     VisibilityCounts, VisibilityParams, VisibleError, retrace_visibility, trace_visibility,
@@ -90,61 +90,84 @@ const KEPT: f32 = 8.0;
 /// A share of an entry's light below which a change is not worth rays.
 const LEAST_SHARE: f32 = 0.01;
 
-/// Updates the entries of a frame's queue, in parallel in the caller's rayon pool. `places` are of the queue
-/// ([`EntryPlaces::of`]). What comes out depends on the arguments alone.
-///
-/// Directions of cones are in world space: where a receiver turns, the light about it does not.
-pub fn update_moment_cones(
-    cache: &mut ConeCache<MomentEntry>,
-    queue: &UpdateQueue,
-    places: &EntryPlaces,
-    tracer: &Tracer,
-    changes: &Changes<'_>,
-    params: &SlcParams,
-) -> SlcCounts {
-    let (rays, changed) = (AtomicU64::new(0), AtomicU64::new(0));
-    let lights = changes.lights();
-    let SlcParams { pick, sequence, seed, .. } = *params;
-    let source = Source { pick, sequence, seed, with_cosine: true };
-    let frame = cache.frame();
-    let updated = cache.update(queue, |index, texel, entry| {
-        let (Some(place), false) = (places.get(index), lights.is_empty()) else { return false };
-        let change = changes.of(place, texel.instance);
-        let site = site_of(texel.instance, texel.place.triangle, texel.place.barycentrics);
-        let mut count = quiet_samples(entry, params, frame.wrapping_add(site as u32));
-        if change.share > LEAST_SHARE {
-            changed.fetch_add(1, Ordering::Relaxed);
-            let root = change.share.sqrt();
-            if params.re_aim {
-                change.re_aim(entry, place, changes);
+/// How a kind of entry is brought up to date with rays.
+pub trait Update: ConeEntry {
+    /// Its settings.
+    type Params: Sync;
+
+    /// Updates the entries of a frame's queue, in parallel in the caller's rayon pool. `places` are of the queue
+    /// ([`EntryPlaces::of`]). What comes out depends on the arguments alone. A queue of another frame updates nothing.
+    ///
+    /// Directions of cones are in world space: where a receiver turns, the light about it does not.
+    fn update_queue(
+        cache: &mut ConeCache<Self>,
+        queue: &UpdateQueue,
+        places: &EntryPlaces,
+        tracer: &Tracer,
+        changes: &Changes<'_>,
+        params: &Self::Params,
+    ) -> SlcCounts;
+}
+
+impl Update for MomentEntry {
+    type Params = SlcParams;
+
+    fn update_queue(
+        cache: &mut ConeCache<Self>,
+        queue: &UpdateQueue,
+        places: &EntryPlaces,
+        tracer: &Tracer,
+        changes: &Changes<'_>,
+        params: &SlcParams,
+    ) -> SlcCounts {
+        let (rays, changed) = (AtomicU64::new(0), AtomicU64::new(0));
+        let lights = changes.lights();
+        let SlcParams { pick, sequence, seed, .. } = *params;
+        let source = Source { pick, sequence, seed, with_cosine: true };
+        let frame = cache.frame();
+        let updated = cache.update(queue, |index, texel, entry| {
+            let (Some(place), false) = (places.get(index), lights.is_empty()) else { return false };
+            let change = changes.of(place, texel.instance);
+            let site = site_of(texel.instance, texel.place.triangle, texel.place.barycentrics);
+            if texel.moved {
+                // What it knows is of a place beside it.
+                ConeEntry::cut_confidence(entry, KEPT as u16);
             }
-            let kept = if params.re_aim && !change.hidden { KEPT_RE_AIMED } else { KEPT };
-            // Of a light that was not there, what the entry knows says nothing.
-            let kept = if change.new > LEAST_SHARE { kept.min(1.0 / change.new) } else { kept / root };
-            entry.cut_confidence(kept.clamp(1.0, 4095.0) as u16);
-            count = count.max(libm::ceilf(params.first_samples as f32 * root) as u32);
-        }
-        let count = count.min(MAX_SAMPLES);
-        if count == 0 {
-            return false;
-        }
-        let mut samples = Vec::with_capacity(count as usize);
-        let traced = take_samples(
-            tracer,
-            lights,
-            place,
-            &source,
-            site,
-            entry.taken()..entry.taken() + count,
-            &mut samples,
-        );
-        rays.fetch_add(traced, Ordering::Relaxed);
-        entry.update(&samples, count, &params.moment);
-        true
-    });
-    // A queue of another frame is the caller's mistake, and updates nothing.
-    let updated = updated.unwrap_or(0);
-    SlcCounts { updated, rays: rays.into_inner(), changed: changed.into_inner() }
+            let mut count = quiet_samples(entry, params, frame.wrapping_add(site as u32));
+            if change.share > LEAST_SHARE {
+                changed.fetch_add(1, Ordering::Relaxed);
+                let root = change.share.sqrt();
+                if params.re_aim {
+                    change.re_aim(entry, place, changes);
+                }
+                let kept = if params.re_aim && !change.hidden { KEPT_RE_AIMED } else { KEPT };
+                // Of a light that was not there, what the entry knows says nothing.
+                let kept = if change.new > LEAST_SHARE { kept.min(1.0 / change.new) } else { kept / root };
+                entry.cut_confidence(kept.clamp(1.0, 4095.0) as u16);
+                count = count.max(libm::ceilf(params.first_samples as f32 * root) as u32);
+            }
+            let count = count.min(MAX_SAMPLES);
+            if count == 0 {
+                return false;
+            }
+            let mut samples = Vec::with_capacity(count as usize);
+            let traced = take_samples(
+                tracer,
+                lights,
+                place,
+                &source,
+                site,
+                (0..count).map(|i| entry.taken().wrapping_add(i)),
+                &mut samples,
+            );
+            rays.fetch_add(traced, Ordering::Relaxed);
+            entry.update(&samples, count, &params.moment);
+            true
+        });
+        // A queue of another frame is the caller's mistake, and updates nothing.
+        let updated = updated.unwrap_or(0);
+        SlcCounts { updated, rays: rays.into_inner(), changed: changed.into_inner() }
+    }
 }
 
 /// Samples of an entry about which nothing changed. Rays from one place together are quicker than apart, so a grown entry takes several in
@@ -186,7 +209,7 @@ fn take_samples(
     place: &EntryPlace,
     source: &Source,
     site: u64,
-    indices: std::ops::Range<u32>,
+    indices: impl ExactSizeIterator<Item = u32>,
     samples: &mut Vec<ConeSample>,
 ) -> u64 {
     let (position, normal) = (place.position_world, place.normal_world);

@@ -6,7 +6,7 @@ use dapple_scene::area_lights::{self, AreaLights, Pick};
 use dapple_scene::glam::Vec3;
 use dapple_store::cones::{BoundingEntry, BoundingParams, ConeCache, Probe, UpdateQueue};
 
-use super::{Changes, EntryPlaces, MAX_SAMPLES, SlcCounts, Source, site_of, take_samples};
+use super::{Changes, EntryPlaces, MAX_SAMPLES, SlcCounts, Source, Update, site_of, take_samples};
 use crate::bvh::{Tracer, offset_origin};
 use crate::direct::Sequence;
 use crate::sampling::{hash, unit_interval};
@@ -47,48 +47,59 @@ impl Default for PaperParams {
     }
 }
 
-/// Updates the entries of a frame's queue, in parallel in the caller's rayon pool; fluence, by all of sec. 3.1. It knows of changes
-/// only what its cones show.
-pub fn update_bounding_cones(
-    cache: &mut ConeCache<BoundingEntry>,
-    queue: &UpdateQueue,
-    places: &EntryPlaces,
-    tracer: &Tracer,
-    changes: &Changes<'_>,
-    params: &PaperParams,
-) -> SlcCounts {
-    let rays = AtomicU64::new(0);
-    let lights = changes.lights();
-    let PaperParams { pick, sequence, seed, .. } = *params;
-    let source = Source { pick, sequence, seed, with_cosine: false };
-    let updated = cache.update(queue, |index, texel, entry| {
-        let (Some(place), false) = (places.get(index), lights.is_empty()) else { return false };
-        let young = u32::from(entry.samples()) < params.first_samples * params.first_updates;
-        let count = if young { params.first_samples } else { params.samples }.min(MAX_SAMPLES);
-        let site = site_of(texel.instance, texel.place.triangle, texel.place.barycentrics);
-        let taken = entry.taken();
-        let mut samples = Vec::with_capacity(count as usize);
-        let mut traced =
-            take_samples(tracer, lights, place, &source, site, taken..taken + count, &mut samples);
-        let mut cycle = entry.update(&samples, count, &params.bounding);
-        if params.probes {
-            let from = offset_origin(place.position_world, place.normal_world);
-            let probes: Vec<Probe> = (0..entry.cones().len())
-                .filter_map(|cone| {
-                    let turn = unit_interval(hash(seed ^ PROBES, site, taken.wrapping_mul(8) + cone as u32));
-                    let direction = entry.probe_direction(cone, turn, &params.bounding)?;
-                    let hit =
-                        place.normal_world.dot(direction) > 0.0 && meets(tracer, lights, from, direction);
-                    Some(Probe { cone, direction, hit })
-                })
-                .collect();
-            traced += probes.len() as u64;
-            entry.probe(&probes, &params.bounding, &mut cycle);
-        }
-        rays.fetch_add(traced, Ordering::Relaxed);
-        true
-    });
-    SlcCounts { updated: updated.unwrap_or(0), rays: rays.into_inner(), changed: 0 }
+/// All of sec. 3.1, in fluence. It knows of changes only what its cones show.
+impl Update for BoundingEntry {
+    type Params = PaperParams;
+
+    fn update_queue(
+        cache: &mut ConeCache<Self>,
+        queue: &UpdateQueue,
+        places: &EntryPlaces,
+        tracer: &Tracer,
+        changes: &Changes<'_>,
+        params: &PaperParams,
+    ) -> SlcCounts {
+        let rays = AtomicU64::new(0);
+        let lights = changes.lights();
+        let PaperParams { pick, sequence, seed, .. } = *params;
+        let source = Source { pick, sequence, seed, with_cosine: false };
+        let updated = cache.update(queue, |index, texel, entry| {
+            let (Some(place), false) = (places.get(index), lights.is_empty()) else { return false };
+            let young = u32::from(entry.samples()) < params.first_samples * params.first_updates;
+            let count = if young { params.first_samples } else { params.samples }.min(MAX_SAMPLES);
+            let site = site_of(texel.instance, texel.place.triangle, texel.place.barycentrics);
+            let taken = entry.taken();
+            let mut samples = Vec::with_capacity(count as usize);
+            let mut traced = take_samples(
+                tracer,
+                lights,
+                place,
+                &source,
+                site,
+                (0..count).map(|i| taken.wrapping_add(i)),
+                &mut samples,
+            );
+            let mut cycle = entry.update(&samples, count, &params.bounding);
+            if params.probes {
+                let from = offset_origin(place.position_world, place.normal_world);
+                let probes: Vec<Probe> = (0..entry.cones().len())
+                    .filter_map(|cone| {
+                        let turn =
+                            unit_interval(hash(seed ^ PROBES, site, taken.wrapping_mul(8) + cone as u32));
+                        let direction = entry.probe_direction(cone, turn, &params.bounding)?;
+                        let hit =
+                            place.normal_world.dot(direction) > 0.0 && meets(tracer, lights, from, direction);
+                        Some(Probe { cone, direction, hit })
+                    })
+                    .collect();
+                traced += probes.len() as u64;
+                entry.probe(&probes, &params.bounding, &mut cycle);
+            }
+            rays.fetch_add(traced, Ordering::Relaxed);
+            true
+        });
+        SlcCounts { updated: updated.unwrap_or(0), rays: rays.into_inner(), changed: 0 }
+    }
 }
 
 /// Keeps probes' random numbers apart from those of samples.

@@ -80,7 +80,7 @@ impl Rig {
         let [then, lights] = [before, now].map(|pose| AreaLights::new(&self.scene, pose));
         let then = Moment { scene: &self.scene, pose: before, lights: &then };
         let changes = Changes::between(&then, &Moment { scene: &self.scene, pose: now, lights: &lights });
-        update_moment_cones(cache, &queue, &places, &tracer, &changes, params)
+        MomentEntry::update_queue(cache, &queue, &places, &tracer, &changes, params)
     }
 
     fn cache(&self) -> ConeCache<MomentEntry> {
@@ -166,7 +166,7 @@ fn the_papers_cones_keep_all_energy_but_what_they_discard() {
             let queue = rig.queue(&mut cache);
             let places = EntryPlaces::of(&cache, &queue, &rig.scene, &rig.pose, &rig.pose);
             let changes = Changes::between(&moment, &moment);
-            let counts = update_bounding_cones(&mut cache, &queue, &places, &tracer, &changes, &params);
+            let counts = BoundingEntry::update_queue(&mut cache, &queue, &places, &tracer, &changes, &params);
             assert!(counts.rays > counts.updated, "samples and probes");
         }
         let all: Vec<f32> = cache.ids().map(|id| cache.entry(id).unwrap().energy().x).collect();

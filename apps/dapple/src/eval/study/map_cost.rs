@@ -100,7 +100,7 @@ impl OfMethod {
                 let times = &self.times[resolution][number];
                 match number {
                     0 => f64::NAN,
-                    _ => times.pass("map") + times.pass("layers"),
+                    _ => times.passes_together(&["map", "layers"]),
                 }
             };
             let mut values = vec![

@@ -45,7 +45,7 @@ pub(super) struct Times {
 }
 
 /// The middle one; of an even number the upper of two.
-fn median(values: &[f64]) -> f64 {
+pub(super) fn median(values: &[f64]) -> f64 {
     let mut values = values.to_vec();
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
@@ -58,7 +58,16 @@ fn least(values: &[f64]) -> f64 {
 impl Times {
     /// Median milliseconds of the passes of a name; 0 where there is none.
     pub(super) fn pass(&self, name: &str) -> f64 {
-        self.passes.iter().filter(|(pass, _)| *pass == name).map(|(_, ms)| median(ms)).sum()
+        self.passes_together(&[name])
+    }
+
+    /// Median over repeats of what the passes of these names took together; so never more than the median of all.
+    pub(super) fn passes_together(&self, names: &[&str]) -> f64 {
+        let of_repeat = |repeat: usize| {
+            let passes = self.passes.iter().filter(|(pass, _)| names.contains(pass));
+            passes.filter_map(|(_, ms)| ms.get(repeat)).sum::<f64>()
+        };
+        median(&(0..self.sums.len()).map(of_repeat).collect::<Vec<_>>())
     }
 
     /// Least milliseconds of the passes of a name; 0 where there is none.

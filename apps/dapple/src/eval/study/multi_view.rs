@@ -113,7 +113,7 @@ impl Study for MultiView {
         };
         let last = runs.len() - 1;
         let to_one = |i: usize| times[i].all() / times[i / 4 * 4].all();
-        let maps = |i: usize| times[i].pass("map") + times[i].pass("second map");
+        let maps = |i: usize| times[i].passes_together(&["map", "second map"]);
         let theirs = |i: usize| TABLE_3[i / 4][i % 4] / TABLE_3[i / 4][0];
         let truth = |value: fn(&Errors) -> f64| {
             let errors = &errors;

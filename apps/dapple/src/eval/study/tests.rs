@@ -190,8 +190,7 @@ fn two_cameras_are_timed_and_judged() {
     let found = run("kind = \"multi-view\"\nrepeats = 2", [96, 54]);
     let time = |row, column| value(&found, 0, row, column);
     for row in 1..5 {
-        // Medians of all and of a part are of different repeats: which is larger is chance on a busy machine.
-        assert!((0..4).all(|view| time(row, view) > 0.0 && value(&found, 1, row - 1, view) > 0.0));
+        assert!((0..4).all(|view| time(row, view) > value(&found, 1, row - 1, view)), "{:?}", found.tables);
         assert!((value(&found, 2, row - 1, 1) - time(row, 1) / time(row, 0)).abs() < 1e-9);
         // Two cameras find more that blocks.
         assert!(value(&found, 5, row, 1) < value(&found, 5, row, 0), "{:?}", found.tables[5]);

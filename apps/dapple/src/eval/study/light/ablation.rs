@@ -5,15 +5,15 @@ use dapple_render::slc::Samples;
 use dapple_scene::Scene;
 use dapple_scene::area_lights::AreaLights;
 use dapple_scene::glam::Vec3;
-use dapple_server::cones::{Now, cone_charts};
+use dapple_server::cones::Now;
 use dapple_store::cones::{BoundingParams, LookUp, MomentParams};
 use dapple_trace::Tracer;
 use dapple_trace::slc::{PaperParams, SlcParams};
 use serde::Deserialize;
 
 use super::super::{Findings, Study, StudyPlot, StudyTable, Subject, axis, column, line, row};
-use super::{Lit, Quality, Run, STEPS_HZ, camera};
-use crate::direct_light::{Sampler, Seen, Technique, truth};
+use super::{Lit, Quality, Run};
+use crate::direct_light::{STEPS_HZ, Sampler, Seen, Technique, charts, truth};
 use crate::eval::stage::Stage;
 
 #[derive(Debug, Deserialize)]
@@ -93,7 +93,7 @@ impl LightAblation {
         let pose = stage.scene().pose(time_s);
         let (mut rows, mut lines) = (Vec::new(), Vec::new());
         lit.at(&pose, |now, lights| {
-            let seen = [Seen::new(now, camera(stage, time_s), size)?];
+            let seen = [Seen::new(now, stage.camera(time_s), size)?];
             let truth = truth(now, lights, &seen[0], self.truth_samples);
             let all = variants();
             for (i, (name, technique)) in all.iter().enumerate() {
@@ -163,9 +163,9 @@ impl LightAblation {
             let tracer = Tracer::new(&scene, &pose);
             let now = Now { scene: &scene, pose: &pose, tracer: &tracer, environment: None };
             let lights = AreaLights::new(&scene, &pose);
-            let seen = [Seen::new(&now, camera(stage, time_s), size)?];
+            let seen = [Seen::new(&now, stage.camera(time_s), size)?];
             let truth = truth(&now, &lights, &seen[0], self.truth_samples);
-            let (charting, _) = cone_charts(&scene);
+            let charting = charts(&scene);
             for (name, technique) in
                 [("rt-48", Technique::rays(48, Sampler::Power)), ("slc", Technique::cones())]
             {
@@ -204,7 +204,7 @@ impl LightAblation {
                 let pose = stage.scene().pose(end_s - f64::from(STEPS - 1 - step) * speed / STEPS_HZ);
                 let last = step + 1 == STEPS;
                 lit.at(&pose, |now, lights| {
-                    let seen = [Seen::new(now, camera(stage, end_s), size)?];
+                    let seen = [Seen::new(now, stage.camera(end_s), size)?];
                     let truth = last.then(|| truth(now, lights, &seen[0], self.truth_samples));
                     for run in runs.iter_mut().filter(|run| last || !run.lighter.is_stateless()) {
                         let watched = step + 4 >= STEPS;

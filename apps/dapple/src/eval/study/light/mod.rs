@@ -7,20 +7,19 @@ pub(super) mod viewers;
 use std::time::Instant;
 
 use anyhow::{Result, bail};
-use dapple_metrics::{flip, psnr, ssim};
+use dapple_metrics::{PIXELS_PER_DEGREE, flip, psnr, ssim};
 use dapple_render::image::{LinearImage, Rgb8Image, ToneMap};
+use dapple_scene::Pose;
 use dapple_scene::area_lights::AreaLights;
 use dapple_scene::glam::Vec3;
-use dapple_scene::{Pose, PosedCamera};
-use dapple_server::cones::{Now, cone_charts};
+use dapple_server::cones::Now;
 use dapple_store::cones::Charting;
 
 use super::Subject;
-use crate::direct_light::{Cost, Lighter, Seen, Technique};
+use super::medians::median;
+use crate::direct_light::{Cost, Lighter, Seen, Technique, charts, warn_of_lights};
 use crate::eval::stage::Stage;
-
-/// Steps of a server a second.
-const STEPS_HZ: f64 = 15.0;
+use crate::picture::luma;
 
 /// A scene whose lights have an area, along a path.
 struct Lit<'a> {
@@ -32,14 +31,12 @@ impl<'a> Lit<'a> {
     fn new(subject: &'a Subject<'_>) -> Result<Lit<'a>> {
         let stage = subject.stage()?;
         let pose = stage.scene().pose(0.0);
-        if AreaLights::new(stage.scene(), &pose).is_empty() {
+        let lights = AreaLights::new(stage.scene(), &pose);
+        if lights.is_empty() {
             bail!("{} has no area light: nothing in it emits", stage.scene().name);
         }
-        let (charting, problems) = cone_charts(stage.scene());
-        for problem in problems {
-            tracing::warn!("{problem}; it carries no cones");
-        }
-        Ok(Lit { stage, charting })
+        warn_of_lights(&lights);
+        Ok(Lit { stage, charting: charts(stage.scene()) })
     }
 
     fn size(&self) -> [u32; 2] {
@@ -100,18 +97,12 @@ impl Run {
     }
 
     fn ms(&self) -> f64 {
-        middle(&self.totals)
+        median(&self.totals)
     }
 
     fn stage_ms(&self, names: &[&str]) -> f64 {
-        self.stages.iter().filter(|(name, _)| names.contains(name)).map(|(_, ms)| middle(ms)).sum()
+        self.stages.iter().filter(|(name, _)| names.contains(name)).map(|(_, ms)| median(ms)).sum()
     }
-}
-
-fn middle(values: &[f64]) -> f64 {
-    let mut values = values.to_vec();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 /// A picture against the truth.
@@ -132,17 +123,9 @@ impl Quality {
         let [a, b] = [truth, found].map(|pixels| shown(size, pixels));
         let unit =
             |p: &Rgb8Image| p.pixels.as_flattened().iter().map(|c| f32::from(*c) / 255.0).collect::<Vec<_>>();
-        let luma = |p: &Rgb8Image| {
-            p.pixels
-                .iter()
-                .map(|[r, g, b]| {
-                    (0.2126 * f32::from(*r) + 0.7152 * f32::from(*g) + 0.0722 * f32::from(*b)) / 255.0
-                })
-                .collect::<Vec<_>>()
-        };
         let db = psnr(&unit(&a), &unit(&b), 1.0)?;
         self.mse += 10f64.powf(-0.1 * db);
-        self.ssim += ssim(width, height, &luma(&a), &luma(&b))?;
+        self.ssim += ssim(width, height, &luma(&a.pixels), &luma(&b.pixels))?;
         self.flip +=
             flip(width, height, a.pixels.as_flattened(), b.pixels.as_flattened(), PIXELS_PER_DEGREE)?.mean;
         // Of what a display can show: a lamp's own brightness would hide all else.
@@ -171,15 +154,7 @@ impl Quality {
     }
 }
 
-/// For FLIP: a monitor 0.7 m wide of 3840 pixels, seen from 0.7 m.
-const PIXELS_PER_DEGREE: f32 = 67.0;
-
 /// What a display shows.
 fn shown([width, height]: [u32; 2], pixels: &[Vec3]) -> Rgb8Image {
     LinearImage { width, height, pixels: pixels.to_vec() }.to_rgb8(&ToneMap::default())
-}
-
-/// A camera of the path.
-fn camera(stage: &Stage<'_>, time_s: f64) -> PosedCamera {
-    stage.camera(time_s)
 }

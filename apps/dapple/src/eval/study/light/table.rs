@@ -4,8 +4,8 @@ use anyhow::Result;
 use serde::Deserialize;
 
 use super::super::{Findings, Study, StudyLine, StudyPlot, StudyTable, Subject, axis, column, line, row};
-use super::{Lit, Quality, Run, STEPS_HZ, camera};
-use crate::direct_light::{Sampler, Seen, Technique, truth};
+use super::{Lit, Quality, Run};
+use crate::direct_light::{STEPS_HZ, Sampler, Seen, Technique, truth};
 use crate::eval::stage::Stage;
 
 #[derive(Debug, Deserialize)]
@@ -96,7 +96,7 @@ impl Study for LightMethods {
                 let pose = stage.scene().pose(at_s);
                 let watched = step + WATCHED >= self.steps;
                 lit.at(&pose, |now, lights| {
-                    let seen = [Seen::new(now, camera(stage, at_s.max(0.0)), size)?];
+                    let seen = [Seen::new(now, stage.camera(at_s.max(0.0)), size)?];
                     for run in &mut runs {
                         // Rays remember nothing.
                         if watched || !run.lighter.is_stateless() {

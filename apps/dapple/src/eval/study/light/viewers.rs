@@ -6,8 +6,8 @@ use dapple_scene::glam::{Affine3A, Vec3};
 use serde::Deserialize;
 
 use super::super::{Findings, Study, StudyPlot, StudyTable, Subject, axis, column, line, row};
-use super::{Lit, Quality, Run, STEPS_HZ, camera};
-use crate::direct_light::{Sampler, Seen, Technique, truth};
+use super::{Lit, Quality, Run};
+use crate::direct_light::{STEPS_HZ, Sampler, Seen, Technique, truth};
 use crate::eval::stage::Stage;
 
 #[derive(Debug, Deserialize)]
@@ -59,7 +59,7 @@ impl Crowd {
 
     fn cameras(self, stage: &Stage<'_>, viewers: u32, time_s: f64) -> Vec<PosedCamera> {
         let turned = |degrees: f32| {
-            let mut posed = camera(stage, time_s);
+            let mut posed = stage.camera(time_s);
             let eye = posed.world_from_view.translation;
             let turn = Affine3A::from_rotation_y(degrees.to_radians());
             posed.world_from_view.matrix3 = turn.matrix3 * posed.world_from_view.matrix3;
@@ -67,9 +67,8 @@ impl Crowd {
             posed
         };
         // Golden parts of the path: places far from each other however many there are.
-        let apart = |i: u32| {
-            camera(stage, (time_s + f64::from(i) * 0.618_033_988_75 * stage.seconds) % stage.seconds)
-        };
+        let apart =
+            |i: u32| stage.camera((time_s + f64::from(i) * 0.618_033_988_75 * stage.seconds) % stage.seconds);
         let width_degrees = 70.0;
         (0..viewers)
             .flat_map(|i| match self {
@@ -128,10 +127,10 @@ impl LightViewers {
                     cameras.into_iter().map(|c| Seen::new(now, c, size)).collect::<Result<Vec<_>>>()?;
                 let mut pictures = Vec::new();
                 for run in &mut runs {
-                    let needed = watched && (step + 1 == steps || !run.lighter.is_stateless());
-                    pictures.push(match needed || !run.lighter.is_stateless() {
-                        true => run.step(now, lights, &seen, &lit.charting, watched),
-                        false => Vec::new(),
+                    // Rays remember nothing: the last step is enough.
+                    pictures.push(match run.lighter.is_stateless() && step + 1 < steps {
+                        true => Vec::new(),
+                        false => run.step(now, lights, &seen, &lit.charting, watched),
                     });
                 }
                 if step + 1 < steps {
