@@ -27,6 +27,8 @@ pub struct LightVisibility {
 pub struct LightChange {
     /// Which: light × points + point.
     pub index: u32,
+    /// What it was.
+    pub old: u8,
     /// What it is now, 0 … [`OPEN`].
     pub new: u8,
 }
@@ -205,10 +207,11 @@ mod tests {
         );
         assert_eq!(held.fraction(2, 1), Some(1.0));
         let before = (held.clone(), held.hash());
-        let bad = [LightChange { index: 0, new: 9 }, LightChange { index: 6, new: 0 }];
+        let change = |index, new| LightChange { index, old: 0, new };
+        let bad = [change(0, 9), change(6, 0)];
         assert_eq!(held.apply(&bad), Err(LightVisibilityError::NoSuchValue { index: 6, values: 6 }));
         assert_eq!(
-            held.apply(&[LightChange { index: 1, new: 32 }]),
+            held.apply(&[change(1, 32)]),
             Err(LightVisibilityError::BadValue { index: 1, value: 32 })
         );
         assert_eq!((held.clone(), held.hash()), before);

@@ -166,7 +166,8 @@ impl<C: Coder> Walk<'_, C> {
         };
         let change = if rises { size } else { -size };
         self.moved[point] = change as i8;
-        self.changes.push(LightChange { index: (self.first + point) as u32, new: (old + change) as u8 });
+        let index = (self.first + point) as u32;
+        self.changes.push(LightChange { index, old: old as u8, new: (old + change) as u8 });
     }
 
     fn around(&self, point: usize, old: i32) -> Around {

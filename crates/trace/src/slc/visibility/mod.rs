@@ -148,10 +148,10 @@ fn trace_due(
         let start = light * values.points();
         for (list, chunk) in &found {
             counts = counts.add(*chunk);
-            for &(point, new) in
-                list.iter().filter(|(point, new)| before.get(*point).is_some_and(|b| b != new))
-            {
-                changed.push(LightChange { index: (start + point) as u32, new });
+            for &(point, new) in list {
+                if let Some(&old) = before.get(point).filter(|old| **old != new) {
+                    changed.push(LightChange { index: (start + point) as u32, old, new });
+                }
             }
         }
     }
