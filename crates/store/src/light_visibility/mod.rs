@@ -210,10 +210,7 @@ mod tests {
         let change = |index, new| LightChange { index, old: 0, new };
         let bad = [change(0, 9), change(6, 0)];
         assert_eq!(held.apply(&bad), Err(LightVisibilityError::NoSuchValue { index: 6, values: 6 }));
-        assert_eq!(
-            held.apply(&[change(1, 32)]),
-            Err(LightVisibilityError::BadValue { index: 1, value: 32 })
-        );
+        assert_eq!(held.apply(&[change(1, 32)]), Err(LightVisibilityError::BadValue { index: 1, value: 32 }));
         assert_eq!((held.clone(), held.hash()), before);
         held.apply(&bad[..1]).unwrap();
         assert_eq!(held.values(), [9, 1, 2, 29, 30, 31]);
