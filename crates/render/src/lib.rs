@@ -24,6 +24,7 @@ mod testing;
 pub(crate) use dapple_scene::texture;
 
 pub mod alchemy;
+pub mod area_lights;
 pub mod compose;
 #[cfg(feature = "gpu")]
 pub mod forward;

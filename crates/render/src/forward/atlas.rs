@@ -1,4 +1,4 @@
-//! The atlas on the card: an array texture of two bytes a texel, of which only what changed is written.
+//! An atlas on the card: an array texture of two or four bytes a texel, of which only what changed is written.
 
 use dapple_gpu::{Gpu, wgpu};
 
@@ -16,9 +16,10 @@ pub struct AtlasBand {
     pub end_row: u32,
 }
 
-/// Square layers of texels with two numbers 0 … 1 each (8 bits): the old value and the new one of visibility.
+/// Square layers of texels with two or four numbers 0 … 1 each (8 bits). Two: the old value and the new one of visibility. Four: how much of
+/// each of four lights is seen.
 #[derive(Debug)]
-pub struct AtlasTexture {
+pub struct AtlasTexture<const BYTES: usize = 2> {
     texture: wgpu::Texture,
     view: wgpu::TextureView,
     side: u32,
@@ -26,10 +27,17 @@ pub struct AtlasTexture {
     layers: u32,
 }
 
-impl AtlasTexture {
+impl<const BYTES: usize> AtlasTexture<BYTES> {
+    /// A texel of two bytes, or of four.
+    const FORMAT: wgpu::TextureFormat = match BYTES {
+        2 => wgpu::TextureFormat::Rg8Unorm,
+        4 => wgpu::TextureFormat::Rgba8Unorm,
+        _ => panic!("texels have two or four bytes"),
+    };
+
     /// One texel and no layer in use.
-    pub fn new(gpu: &Gpu) -> AtlasTexture {
-        let (texture, view) = make(gpu, 1, 0);
+    pub fn new(gpu: &Gpu) -> AtlasTexture<BYTES> {
+        let (texture, view) = make(gpu, Self::FORMAT, 1, 0);
         AtlasTexture { texture, view, side: 1, layers: 0 }
     }
 
@@ -42,7 +50,7 @@ impl AtlasTexture {
         &mut self,
         gpu: &Gpu,
         side: u32,
-        layers: &[&[[u8; 2]]],
+        layers: &[&[[u8; BYTES]]],
         bands: &[AtlasBand],
     ) -> Result<bool, ForwardError> {
         let texels = layers;
@@ -64,7 +72,7 @@ impl AtlasTexture {
         }
         let is_new = side != self.side || layers != self.layers;
         if is_new {
-            (self.texture, self.view) = make(gpu, side, layers);
+            (self.texture, self.view) = make(gpu, Self::FORMAT, side, layers);
             (self.side, self.layers) = (side, layers);
             for layer in 0..layers {
                 self.write(gpu, texels, AtlasBand { layer, first_row: 0, end_row: side });
@@ -77,7 +85,7 @@ impl AtlasTexture {
         Ok(is_new)
     }
 
-    fn write(&self, gpu: &Gpu, texels: &[&[[u8; 2]]], band: AtlasBand) {
+    fn write(&self, gpu: &Gpu, texels: &[&[[u8; BYTES]]], band: AtlasBand) {
         let end_row = band.end_row.min(self.side);
         if band.layer >= self.layers || band.first_row >= end_row {
             return;
@@ -88,10 +96,10 @@ impl AtlasTexture {
                 origin: wgpu::Origin3d { x: 0, y: band.first_row, z: band.layer },
                 ..self.texture.as_image_copy()
             },
-            bytemuck::cast_slice(&texels[band.layer as usize][row(band.first_row)..row(end_row)]),
+            texels[band.layer as usize][row(band.first_row)..row(end_row)].as_flattened(),
             wgpu::TexelCopyBufferLayout {
                 offset: 0,
-                bytes_per_row: Some(2 * self.side),
+                bytes_per_row: Some(BYTES as u32 * self.side),
                 rows_per_image: None,
             },
             wgpu::Extent3d { width: self.side, height: end_row - band.first_row, depth_or_array_layers: 1 },
@@ -100,7 +108,8 @@ impl AtlasTexture {
 
     /// Bytes on the card.
     pub fn bytes(&self) -> u64 {
-        u64::from(self.side) * u64::from(self.side) * u64::from(self.texture.depth_or_array_layers()) * 2
+        let layers = u64::from(self.texture.depth_or_array_layers());
+        u64::from(self.side) * u64::from(self.side) * layers * BYTES as u64
     }
 
     pub(super) fn view(&self) -> &wgpu::TextureView {
@@ -108,7 +117,12 @@ impl AtlasTexture {
     }
 }
 
-fn make(gpu: &Gpu, side: u32, layers: u32) -> (wgpu::Texture, wgpu::TextureView) {
+fn make(
+    gpu: &Gpu,
+    format: wgpu::TextureFormat,
+    side: u32,
+    layers: u32,
+) -> (wgpu::Texture, wgpu::TextureView) {
     let depth_or_array_layers = layouts::array_layers(layers);
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some("atlas"),
@@ -116,7 +130,7 @@ fn make(gpu: &Gpu, side: u32, layers: u32) -> (wgpu::Texture, wgpu::TextureView)
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Rg8Unorm,
+        format,
         usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
     });

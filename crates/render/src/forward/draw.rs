@@ -164,7 +164,7 @@ impl Forward {
                 frame_group(gpu, &self.frame_layout, &self.frames.buffer, &self.lights, &self.shadows);
         }
         self.lights.write(gpu, bytemuck::bytes_of(&*lights.uniform));
-        self.write_frames(gpu, inputs, &cameras, lights.count);
+        self.write_frames(gpu, inputs, &cameras, (lights.count, scene.area_lights.code()));
         self.prepare_targets(gpu, size);
 
         let mut drawn =
@@ -257,12 +257,12 @@ impl Forward {
         gpu: &Gpu,
         inputs: &FrameInputs<'_>,
         cameras: &[ViewCamera],
-        light_count: u32,
+        (light_count, area_lights): (u32, u32),
     ) {
         let mut bytes = vec![0u8; FRAME_STRIDE * cameras.len()];
         let views = inputs.views.iter().zip(cameras);
         for (slot, (view, camera)) in bytes.chunks_exact_mut(FRAME_STRIDE).zip(views) {
-            let uniform = frame_uniform(inputs, view, camera, light_count);
+            let uniform = frame_uniform(inputs, view, camera, light_count, area_lights);
             slot[..size_of::<FrameUniform>()].copy_from_slice(bytemuck::bytes_of(&uniform));
         }
         if self.frames.write(gpu, &bytes) {
@@ -327,6 +327,8 @@ impl Forward {
         camera: &ViewCamera,
         wants: Wants,
     ) -> Vec<Draw> {
+        let draws_area_lights =
+            matches!(wants.stage, Stage::Picture(_)) && !wants.inspects && scene.area_lights.is_lit();
         let mut opaque: Vec<(f32, Draw)> = Vec::new();
         let mut blended: Vec<(f32, Draw)> = Vec::new();
         for batch in &scene.batches {
@@ -349,6 +351,7 @@ impl Forward {
                         cuts_holes: !is_blended && material.alpha != AlphaMode::Opaque,
                         blends: is_blended,
                         inspects: wants.inspects,
+                        area_lights: draws_area_lights,
                     };
                     self.pipelines.prepare(gpu, key);
                     let draw = Draw { key, mesh: batch.mesh, part, first, end };

@@ -111,7 +111,7 @@ impl Forward {
         };
         let mut bytes = vec![0u8; FRAME_STRIDE * views.len()];
         for (slot, (view, camera)) in bytes.chunks_exact_mut(FRAME_STRIDE).zip(views) {
-            let uniform = frame_uniform(&inputs, view, camera, 0);
+            let uniform = frame_uniform(&inputs, view, camera, 0, 0);
             slot[..size_of_val(&uniform)].copy_from_slice(bytemuck::bytes_of(&uniform));
         }
         let frames = layouts::buffer(&gpu.device, "geometry frames", &bytes, wgpu::BufferUsages::UNIFORM);

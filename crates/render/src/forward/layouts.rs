@@ -70,7 +70,7 @@ pub(super) fn material(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     layout(device, "material", &entries)
 }
 
-/// Group 2: `deform.wgsl` and `vertex.wgsl`.
+/// Group 2: `deform.wgsl`, `vertex.wgsl` and `area_lights/reflect.wgsl`.
 pub(super) fn surface(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let entries = [
         (Stages::VERTEX, texture(LOADED, Dimension::D2)),
@@ -79,6 +79,8 @@ pub(super) fn surface(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         (Stages::VERTEX_FRAGMENT, texture(FILTERED, Dimension::D2Array)),
         (Stages::FRAGMENT, SAMPLER),
         (Stages::FRAGMENT, texture(FILTERED, Dimension::D2Array)),
+        (Stages::FRAGMENT, texture(FILTERED, Dimension::D2Array)),
+        (Stages::FRAGMENT, texture(LOADED, Dimension::D2)),
     ];
     layout(device, "surface", &entries)
 }

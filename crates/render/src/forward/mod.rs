@@ -3,6 +3,7 @@
 //! Takes a [`GpuScene`] and [`FrameInputs`]; draws into a texture view what the twins ([`crate::gbuffer`],
 //! [`crate::shade`], [`crate::compose`]) draw into memory. See `README.md` for how closely they agree.
 
+mod area;
 mod atlas;
 mod draw;
 mod error;

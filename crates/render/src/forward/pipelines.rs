@@ -29,6 +29,8 @@ pub(super) fn forward_module(lookup: &Lookup) -> String {
         include_str!("wgsl/display.wgsl"),
         include_str!("wgsl/brdf.wgsl"),
         include_str!("wgsl/light.wgsl"),
+        include_str!("../area_lights/arrival.wgsl"),
+        include_str!("../area_lights/reflect.wgsl"),
         include_str!("wgsl/fragment.wgsl"),
         include_str!("wgsl/inspect.wgsl"),
         LOOKUP_INPUT_WGSL,
@@ -102,6 +104,7 @@ pub(super) struct PipelineKey {
     pub(super) cuts_holes: bool,
     pub(super) blends: bool,
     pub(super) inspects: bool,
+    pub(super) area_lights: bool,
 }
 
 /// All pipelines that draw into the picture.
@@ -196,9 +199,10 @@ impl Pipelines {
         })];
         let flag = |on: bool| f64::from(u8::from(on));
         let rest = ("NEEDS_REST", flag(stage.needs_rest));
+        let area_lights = ("AREA_LIGHTS", flag(key.area_lights));
         let mut fragment_constants = vec![("CUTS_HOLES", flag(key.cuts_holes))];
         if let Stage::Picture(_) = key.stage {
-            let own = [rest, ("BLENDS", flag(key.blends)), ("INSPECTS", flag(key.inspects))];
+            let own = [rest, area_lights, ("BLENDS", flag(key.blends)), ("INSPECTS", flag(key.inspects))];
             fragment_constants.extend(own);
         }
         // Whose depths are all there is.
@@ -213,7 +217,7 @@ impl Pipelines {
             vertex: wgpu::VertexState {
                 module: &stage.module,
                 entry_point: Some(if key.detailed { "vertex_detailed" } else { "vertex_plain" }),
-                compilation_options: options(&[rest]),
+                compilation_options: options(&[rest, area_lights]),
                 buffers: &vertex_layouts(key.detailed),
             },
             primitive: wgpu::PrimitiveState {

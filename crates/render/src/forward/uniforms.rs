@@ -26,7 +26,7 @@ pub(super) struct FrameUniform {
     pub(super) dim: f32,
     pub(super) point_half: [f32; 2],
     pub(super) point_half_m: f32,
-    pub(super) pad: f32,
+    pub(super) area_lights: u32,
 }
 
 /// `Light` in `frame.wgsl`.

@@ -42,6 +42,7 @@ pub(super) fn frame_uniform(
     view: &View<'_>,
     camera: &ViewCamera,
     light_count: u32,
+    area_lights: u32,
 ) -> FrameUniform {
     let shade = inputs.shade;
     let (sky, ground) = match shade.ambient {
@@ -70,7 +71,7 @@ pub(super) fn frame_uniform(
         dim: dim(view.kind),
         point_half: [radius_px / viewport.width as f32, radius_px / viewport.height as f32],
         point_half_m: radius_px * camera.pixel_m,
-        pad: 0.0,
+        area_lights,
     }
 }
 

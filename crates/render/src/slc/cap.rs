@@ -1,4 +1,6 @@
 //! Light of one cone, reflected: a fixed pattern of directions in it, and glTF's reflectance in lanes.
+//!
+//! Also what area lights are shaded with ([`crate::area_lights`]).
 
 use std::f32::consts::FRAC_1_PI;
 use std::sync::LazyLock;
@@ -83,14 +85,14 @@ struct Sums {
 }
 
 /// A surface about to be shaded.
-pub(super) struct Lens<'a> {
+pub(crate) struct Lens<'a> {
     point: &'a ShadingPoint,
     n_dot_v: f32,
     a2: f32,
 }
 
 impl<'a> Lens<'a> {
-    pub(super) fn of(point: &'a ShadingPoint) -> Lens<'a> {
+    pub(crate) fn of(point: &'a ShadingPoint) -> Lens<'a> {
         let n_dot_v = point.normal_shading_world.dot(point.to_viewer_world).clamp(1e-3, 1.0);
         Lens { point, n_dot_v, a2: point.reflectance.alpha * point.reflectance.alpha }
     }
@@ -101,14 +103,28 @@ impl<'a> Lens<'a> {
             Samples::Fixed(n) => n,
             Samples::Adaptive => self.needed(cap),
         };
+        self.shade_as(cap, entry_normal, (count, shading.form, self.a2))
+    }
+
+    /// The same of irradiance on the point's own shading normal, with a gloss so wide that the directions of the pattern run into each
+    /// other: each stands for its part of the cone. On smooth surfaces wide cones are mirrored whole, not as dots.
+    pub(crate) fn shade_evenly(&self, cap: &Cap) -> Vec3 {
+        let count = self.needed(cap);
+        // Half vectors turn by half of what directions do; α is about the tangent of the lobe's half width.
+        let part = (1.0 - cap.cos_angle) / (2 * count) as f32;
+        let a2 = (self.a2 + part.max(0.0)).min(self.a2.max(1.0));
+        self.shade_as(cap, self.point.normal_shading_world, (count, Form::Ratio, a2))
+    }
+
+    fn shade_as(&self, cap: &Cap, entry_normal: Vec3, (count, form, a2): (u32, Form, f32)) -> Vec3 {
         let (sums, n) = match count {
-            0..4 => (self.sums(cap, entry_normal, &*ONE), 1.0),
-            4..8 => (self.sums(cap, entry_normal, &*FOUR), 4.0),
-            8..16 => (self.sums(cap, entry_normal, &*EIGHT), 8.0),
-            16..64 => (self.sums(cap, entry_normal, &*SIXTEEN), 16.0),
-            64.. => (self.sums(cap, entry_normal, &*SIXTY_FOUR), 64.0),
+            0..4 => (self.sums(cap, entry_normal, a2, &*ONE), 1.0),
+            4..8 => (self.sums(cap, entry_normal, a2, &*FOUR), 4.0),
+            8..16 => (self.sums(cap, entry_normal, a2, &*EIGHT), 8.0),
+            16..64 => (self.sums(cap, entry_normal, a2, &*SIXTEEN), 16.0),
+            64.. => (self.sums(cap, entry_normal, a2, &*SIXTY_FOUR), 64.0),
         };
-        let over = match shading.form {
+        let over = match form {
             Form::Fluence => n,
             // Light that reached the entry came from above its horizon, wherever rounding puts the cone.
             Form::Ratio => sums.entry.max(LEAST_COSINE * n),
@@ -137,7 +153,7 @@ impl<'a> Lens<'a> {
         }
     }
 
-    fn sums<const N: usize>(&self, cap: &Cap, entry_normal: Vec3, pattern: &Pattern<N>) -> Sums {
+    fn sums<const N: usize>(&self, cap: &Cap, entry_normal: Vec3, a2: f32, pattern: &Pattern<N>) -> Sums {
         let (tangent, bitangent) = orthonormal_basis(cap.direction);
         let in_frame = |v: Vec3| [v.dot(tangent), v.dot(bitangent), v.dot(cap.direction)];
         let shading = in_frame(self.point.normal_shading_world);
@@ -145,7 +161,7 @@ impl<'a> Lens<'a> {
         let viewer = in_frame(self.point.to_viewer_world);
         let entry = in_frame(entry_normal);
         let depth = 1.0 - cap.cos_angle;
-        let (a2, nv) = (self.a2, self.n_dot_v);
+        let nv = self.n_dot_v;
         let lambda_v = (nv * nv * (1.0 - a2) + a2).sqrt();
         let mut lanes = [[0.0f32; N]; 5];
         #[allow(clippy::needless_range_loop)] // five lists of lanes at once

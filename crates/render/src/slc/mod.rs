@@ -6,7 +6,7 @@
 //!
 //! No ray is traced: visibility is in the cones. Equations in `README.md`.
 
-mod cap;
+pub(crate) mod cap;
 mod places;
 #[cfg(test)]
 mod tests;

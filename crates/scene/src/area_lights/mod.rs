@@ -8,6 +8,7 @@
 
 mod choose;
 mod environment;
+mod figure;
 mod shape;
 #[cfg(test)]
 mod tests;
@@ -16,6 +17,7 @@ use glam::Vec3;
 
 pub use choose::{Chooser, Pick};
 pub use environment::{Environment, EnvironmentError, MAX_SIDE};
+pub use figure::{LightFigure, LightForm, LightPlace};
 pub use shape::EmitterShape;
 
 use crate::{Pose, Scene};

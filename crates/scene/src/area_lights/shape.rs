@@ -4,6 +4,7 @@ use std::f32::consts::{PI, TAU};
 
 use glam::{Vec2, Vec3};
 
+use super::figure::piece_corners;
 use super::{AreaLight, emitted};
 use crate::{Pose, Scene, texture};
 
@@ -59,14 +60,14 @@ pub(super) enum Shape {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Triangles {
     /// World.
-    corners: Vec<[Vec3; 3]>,
+    pub(super) corners: Vec<[Vec3; 3]>,
     /// Running sums of area × mean luminance.
-    weight: Vec<f32>,
+    pub(super) weight: Vec<f32>,
     area: f32,
     /// Material, and both sets of texture coordinates of each corner, where emission is textured.
-    textured: Vec<Option<(u32, [[Vec2; 2]; 3])>>,
+    pub(super) textured: Vec<Option<(u32, [[Vec2; 2]; 3])>>,
     /// Radiance where it is not.
-    plain: Vec<Vec3>,
+    pub(super) plain: Vec<Vec3>,
     ball: (Vec3, f32),
 }
 
@@ -257,6 +258,24 @@ fn blend(uvs: &[[Vec2; 2]; 3], p: f32, q: f32) -> [Vec2; 2] {
     [0, 1].map(|set| uvs[0][set] * (1.0 - p - q) + uvs[1][set] * p + uvs[2][set] * q)
 }
 
+impl Triangles {
+    /// Area × mean luminance of one.
+    pub(super) fn own_weight(&self, triangle: usize) -> f32 {
+        let before = if triangle == 0 { 0.0 } else { self.weight[triangle - 1] };
+        self.weight[triangle] - before
+    }
+
+    /// Mean radiance of one of the `side²` like pieces of a triangle.
+    pub(super) fn mean_emission(&self, scene: &Scene, triangle: usize, side: usize, piece: usize) -> Vec3 {
+        let Some((material, uvs)) = &self.textured[triangle] else { return self.plain[triangle] };
+        let [a, b, c] = piece_corners(side, piece).map(Vec2::from);
+        mean_over(|[p, q]| {
+            let at = a + (b - a) * p + (c - a) * q;
+            texture::emission(scene, &scene.materials[*material as usize], &blend(uvs, at.x, at.y))
+        })
+    }
+}
+
 impl Shape {
     /// Square metres, of one side.
     pub(super) fn area(&self) -> f32 {
@@ -347,14 +366,13 @@ impl Shape {
             Shape::Triangles(t) => {
                 let total = *t.weight.last()?;
                 let i = t.weight.partition_point(|sum| *sum <= u[0] * total).min(t.weight.len() - 1);
-                let before = if i == 0 { 0.0 } else { t.weight[i - 1] };
                 let [a, b, c] = t.corners[i];
                 let cross = (b - a).cross(c - a);
                 let area = 0.5 * cross.length();
                 let [p, q] = fold([u[1], u[2]]);
                 let at = a + (b - a) * p + (c - a) * q;
                 // As if the whole light had this triangle's density.
-                let area = area * total / (t.weight[i] - before);
+                let area = area * total / t.own_weight(i);
                 let emission = match &t.textured[i] {
                     Some((material, uvs)) => Emission::Textured(*material, blend(uvs, p, q)),
                     None => Emission::Constant(t.plain[i]),

@@ -15,13 +15,16 @@ use dapple_store::charts::{ChartSet, Placement};
 use glam::Mat3;
 
 use super::ForwardError;
+use super::area::AreaLightTextures;
 use super::atlas::{AtlasBand, AtlasTexture};
 use super::layouts::{self, Growing};
 use super::uniforms::{
     INSTANCE_BACK_PAGES_SHIFT, INSTANCE_MIRRORED, INSTANCE_PER_VERTEX, INSTANCE_REST_MIRRORED,
     INSTANCE_STORED_TANGENTS, InstanceRaw, RIGID, rows,
 };
+use crate::area_lights::AreaLightTable;
 use crate::gbuffer::check_scene;
+use crate::psao::atlas::LIGHTS_A_TEXEL;
 pub(super) use bounds::{CasterBounds, is_outside};
 use deform::Deformation;
 pub(super) use material::GpuMaterial;
@@ -56,6 +59,7 @@ pub struct GpuScene {
     pages: PageTable,
     atlas: AtlasTexture,
     inspection: AtlasTexture,
+    pub(super) area_lights: AreaLightTextures,
     sampler: wgpu::Sampler,
     layout: wgpu::BindGroupLayout,
     pub(super) group: wgpu::BindGroup,
@@ -127,7 +131,9 @@ impl GpuScene {
             ..Default::default()
         });
         let layout = layouts::surface(&gpu.device);
-        let group = surface_group(gpu, &layout, &deformation, &pages, &atlas, &sampler, &inspection);
+        let area_lights = AreaLightTextures::new(gpu);
+        let group =
+            surface_group(gpu, &layout, &deformation, &pages, &atlas, &sampler, &inspection, &area_lights);
         let size = (scene.instances.len().max(1) * size_of::<InstanceRaw>()) as u64;
         Ok(GpuScene {
             materials: material::upload_all(gpu, &scene, options.mips),
@@ -145,6 +151,7 @@ impl GpuScene {
             pages,
             atlas,
             inspection,
+            area_lights,
             sampler,
             layout,
             group,
@@ -271,6 +278,32 @@ impl GpuScene {
         Ok(())
     }
 
+    /// Draws these area lights from now on, dimmed by what [`GpuScene::upload_lights`] was given; an empty table draws none, and costs nothing.
+    /// To be called when lights or what they look like changed.
+    pub fn set_area_lights(&mut self, gpu: &Gpu, table: &AreaLightTable) {
+        if self.area_lights.set_table(gpu, table) {
+            self.regroup(gpu);
+        }
+    }
+
+    /// Writes how much of each light is seen, in an atlas of the same size as that of visibility: four lights a group, in the order of
+    /// [`AreaLightTable::lights`], of each group all layers. While there are fewer groups than the table has lights all lights are open.
+    ///
+    /// # Errors
+    /// As [`AtlasTexture::upload`], for the layers of all groups together; groups that differ in length.
+    pub fn upload_lights(
+        &mut self,
+        gpu: &Gpu,
+        side: u32,
+        groups: &[&[[u8; LIGHTS_A_TEXEL]]],
+        bands: &[AtlasBand],
+    ) -> Result<(), ForwardError> {
+        if self.area_lights.upload(gpu, side, groups, bands)? {
+            self.regroup(gpu);
+        }
+        Ok(())
+    }
+
     fn regroup(&mut self, gpu: &Gpu) {
         self.group = surface_group(
             gpu,
@@ -280,12 +313,13 @@ impl GpuScene {
             &self.atlas,
             &self.sampler,
             &self.inspection,
+            &self.area_lights,
         );
     }
 
-    /// Bytes of vertices, indices and atlas on the card; textures of materials not counted.
+    /// Bytes of vertices, indices, atlas and area lights on the card; textures of materials not counted.
     pub fn bytes(&self) -> u64 {
-        self.meshes.iter().map(GpuMesh::bytes).sum::<u64>() + self.atlas.bytes() + self.inspection.bytes()
+        self.meshes.iter().map(GpuMesh::bytes).sum::<u64>() + self.atlas.bytes() + self.inspection.bytes() + self.area_lights.bytes()
     }
 
     /// Writes everything that moves, and sorts the instances into batches.
@@ -362,6 +396,7 @@ fn surface_group(
     atlas: &AtlasTexture,
     sampler: &wgpu::Sampler,
     inspection: &AtlasTexture,
+    area_lights: &AreaLightTextures,
 ) -> wgpu::BindGroup {
     use wgpu::BindingResource::{Sampler, TextureView};
     let resources = [
@@ -371,6 +406,8 @@ fn surface_group(
         TextureView(atlas.view()),
         Sampler(sampler),
         TextureView(inspection.view()),
+        TextureView(area_lights.atlas_view()),
+        TextureView(area_lights.table_view()),
     ];
     layouts::group(&gpu.device, layout, &resources)
 }

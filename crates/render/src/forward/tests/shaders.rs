@@ -65,7 +65,7 @@ fn every_module_is_valid_and_within_webgl2() {
 fn uniforms_are_laid_out_as_in_the_shaders() {
     let module = validate(&forward_module(&built_in()[0])).unwrap();
     let frame = members!(FrameUniform: clip_from_relative eye_world view axis_world is_parallel ambient_sky
-        exposure ambient_ground tone_curve fade specular light_count dim point_half point_half_m pad);
+        exposure ambient_ground tone_curve fade specular light_count dim point_half point_half_m area_lights);
     check_struct(&module, "Frame", size_of::<FrameUniform>(), &frame).unwrap();
     let light = members!(LightUniform: position_world inverse_range_squared direction_world is_directional intensity
         first_face cone face_count pad);

@@ -100,6 +100,14 @@ fn fragment(varyings: Varyings, @builtin(front_facing) is_front: bool) -> @locat
             }
         }
     }
+    if AREA_LIGHTS {
+        var texel = v.light_texels.zw;
+        if is_front {
+            texel = v.light_texels.xy;
+        }
+        let area = AreaSurface(input.position_world, normal, flat_normal, to_viewer);
+        radiance += area_reflected(surface, area, v.atlas, texel);
+    }
     return vec4(displayed(radiance), alpha);
 }
 

@@ -24,7 +24,8 @@ struct Frame {
     point_half: vec2<f32>,
     // Metres that half a point spans: at distance 1 (perspective) or anywhere (parallel).
     point_half_m: f32,
-    pad: f32,
+    // Area lights in the lower half; layers of a group of four of them in the upper one, or 0: all are open.
+    area_lights: u32,
 }
 
 struct Light {

@@ -7,9 +7,13 @@
 
 // Whether the look-up reads the place at rest.
 override NEEDS_REST: bool = false;
+// Whether area lights are drawn.
+override AREA_LIGHTS: bool = false;
 
 const PAGE_TABLE_WIDTH: u32 = 1024u;
 const NO_PAGE: u32 = 0xffffu;
+// Of light_texels.
+const NO_TEXEL: u32 = 0xffffffffu;
 // Steps of a chart coordinate in a texel.
 const TEXEL_FRACTION: f32 = 32.0;
 
@@ -63,6 +67,9 @@ struct Varyings {
     @location(7) @interpolate(flat, either) ids: vec3<u32>,
     // Of the back, where it has texels of its own.
     @location(8) @interpolate(perspective, centroid) atlas_back: vec3<f32>,
+    // Where vertices have texels of their own and area lights are drawn: that of the front's, x and y in 16 bits each and the layer, then the
+    // back's. Of one vertex: such triangles are smaller than a texel.
+    @location(9) @interpolate(flat, either) light_texels: vec4<u32>,
 }
 
 @vertex
@@ -93,12 +100,34 @@ fn place(v: PlainVertex, detail: DetailedVertex) -> Varyings {
     if back_pages > 0u {
         out.atlas_back = atlas_place(v.chart, v.instance.y + back_pages, v.instance.w);
     }
+    out.light_texels = vec4(0u, NO_TEXEL, 0u, NO_TEXEL);
+    if AREA_LIGHTS && (v.instance.w & INSTANCE_PER_VERTEX) != 0u {
+        let front = vertex_texel(v.chart, v.instance.y);
+        out.light_texels = vec4(front, front);
+        if back_pages > 0u {
+            out.light_texels = vec4(front, vertex_texel(v.chart, v.instance.y + back_pages));
+        }
+    }
     out.position_rest = vec3(0.0);
     if NEEDS_REST {
         out.position_rest = vec3(dot(v.rest_x.xyz, v.position), dot(v.rest_y.xyz, v.position), dot(v.rest_z.xyz, v.position));
     }
     out.ids = vec3(v.instance.x, v.instance.w, v.chart.w);
     return out;
+}
+
+// The texel of a vertex that has one of its own, as in light_texels.
+fn vertex_texel(chart: vec4<u32>, first_page: u32) -> vec2<u32> {
+    if chart.x == NO_PAGE {
+        return vec2(0u, NO_TEXEL);
+    }
+    let entry = first_page + chart.x;
+    let page = textureLoad(page_table, vec2(entry % PAGE_TABLE_WIDTH, entry / PAGE_TABLE_WIDTH), 0);
+    if page.w == 0u {
+        return vec2(0u, NO_TEXEL);
+    }
+    let at = page.yz + vec2<u32>(vec2<f32>(chart.yz) / TEXEL_FRACTION);
+    return vec2(at.x | (at.y << 16u), page.x);
 }
 
 fn atlas_place(chart: vec4<u32>, first_page: u32, bits: u32) -> vec3<f32> {

@@ -1,11 +1,12 @@
 //! Bent normals in the atlas: sums of rest-space directions, by the weights of visibility, beside the texels that are shown.
 
 use dapple_scene::{Pose, Scene};
-use dapple_store::charts::{ChartSet, TEXEL_FRACTION};
+use dapple_store::charts::TEXEL_FRACTION;
 use dapple_store::points::{BentChange, BentNormal, BentPlanes, PackedNormal, PointSet};
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::lights::nearest_texel;
 use super::resolve::PointTexels;
 use super::{ReadySet, SetState, VisibilityAtlas};
 use crate::gbuffer::GBuffer;
@@ -101,7 +102,7 @@ impl VisibilityAtlas {
         // The back's texels follow the front's.
         let is_back = back && bent.sums.len() > charts.texel_count() as usize;
         let first = if is_back { charts.texel_count() } else { 0 };
-        let texel = |page: usize, x: u32, y: u32| bent.at(first + texel_number(charts, page, x, y));
+        let texel = |page: usize, x: u32, y: u32| bent.at(first + nearest_texel(charts, page, x, y));
         let sum = if charts.is_per_vertex() {
             let [b, c] = barycentrics;
             let [va, vb, vc] = corners.map(|uv| {
@@ -135,11 +136,4 @@ impl VisibilityAtlas {
         };
         samples.map(|sample| of_sample(sample).unwrap_or(Vec3::ZERO)).collect()
     }
-}
-
-/// Number of a texel of a page, the nearest one that there is.
-fn texel_number(charts: &ChartSet, page: usize, x: u32, y: u32) -> u32 {
-    let size = charts.pages()[page];
-    let within = |at: u32, size: u16| at.min(u32::from(size).saturating_sub(1));
-    charts.first_texel_of_page(page) + within(y, size.height) * u32::from(size.width) + within(x, size.width)
 }

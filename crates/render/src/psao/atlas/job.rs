@@ -211,7 +211,8 @@ impl VisibilityAtlas {
         {
             self.pages.fill(*placement, *size, |i| [255, sums.value(first + i)]);
         }
-        let ready = ReadySet { charts, charts_key, table, sums, bent: None, placements, placed };
+        let ready =
+            ReadySet { charts, charts_key, table, sums, bent: None, lights: None, placements, placed };
         self.sets[set] = SetState::Ready(Box::new(ready));
         self.fresh.push(set);
         self.ready.push(self.layout.sets()[set].instance);

@@ -5,6 +5,8 @@
 
 mod bent;
 mod job;
+mod light_texels;
+mod lights;
 mod pages;
 mod resolve;
 mod sets;
@@ -20,11 +22,14 @@ use dapple_store::charts::{AtlasError, ChartError, ChartSet, Cuts, InstanceKey, 
 use dapple_store::points::PointLayout;
 
 pub use dapple_store::charts::Placement;
+pub use light_texels::LIGHTS_A_TEXEL;
 pub use pages::{DirtyBand, MAX_LAYERS};
 pub use upload::TexelInfo;
 
 use bent::BentSums;
 use job::{ENCODED_A_TEXEL, Job, SUMMED_A_TEXEL, Stage, VISITS_A_TEXEL};
+use light_texels::LightTexels;
+use lights::LightSums;
 use pages::{Pages, PlacedPages};
 use resolve::{PointTexels, Sums};
 
@@ -99,6 +104,8 @@ pub struct VisibilityAtlas {
     /// All other texels whose two values may differ, each once.
     fading: Vec<u32>,
     failed: Vec<(u32, BuildError)>,
+    /// Of lights that are shown on a card.
+    light_texels: Option<LightTexels>,
 }
 
 /// Why an instance cannot be shown with its visibility.
@@ -136,6 +143,8 @@ struct ReadySet {
     sums: Sums,
     /// Once they are taken in.
     bent: Option<BentSums>,
+    /// Once it is taken in.
+    lights: Option<LightSums>,
     /// Of the front's pages, then, if it is seen from both sides, of the back's.
     placements: Vec<Placement>,
     placed: PlacedPages,
@@ -169,6 +178,7 @@ impl VisibilityAtlas {
             fresh: Vec::new(),
             fading: Vec::new(),
             failed: Vec::new(),
+            light_texels: None,
             layout,
         };
         atlas.queue_open(scene);

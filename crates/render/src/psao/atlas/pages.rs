@@ -204,20 +204,25 @@ impl Pages {
 
     /// The rows that changed since the last call, joined to bands.
     pub(super) fn take_dirty(&mut self) -> Vec<DirtyBand> {
-        let mut bands: Vec<DirtyBand> = Vec::new();
-        for (layer, rows) in (0u32..).zip(self.dirty.chunks_mut(self.side as usize)) {
-            for (y, row) in (0u32..).zip(rows) {
-                if !std::mem::take(row) {
-                    continue;
-                }
-                match bands.last_mut() {
-                    Some(band) if band.layer == layer && y - band.y.end <= BRIDGED_ROWS => band.y.end = y + 1,
-                    _ => bands.push(DirtyBand { layer, y: y..y + 1 }),
-                }
+        take_bands(&mut self.dirty, self.side)
+    }
+}
+
+/// The rows of layers of `side` rows that are marked, joined to bands; no row is marked afterwards.
+pub(super) fn take_bands(dirty: &mut [bool], side: u32) -> Vec<DirtyBand> {
+    let mut bands: Vec<DirtyBand> = Vec::new();
+    for (layer, rows) in (0u32..).zip(dirty.chunks_mut(side as usize)) {
+        for (y, row) in (0u32..).zip(rows) {
+            if !std::mem::take(row) {
+                continue;
+            }
+            match bands.last_mut() {
+                Some(band) if band.layer == layer && y - band.y.end <= BRIDGED_ROWS => band.y.end = y + 1,
+                _ => bands.push(DirtyBand { layer, y: y..y + 1 }),
             }
         }
-        bands
     }
+    bands
 }
 
 /// Writes values to neighbouring texels.

@@ -40,6 +40,9 @@ impl VisibilityAtlas {
                 (None, SetState::Ready(ready)) => {
                     let sides = ready.placements.len() / ready.charts.pages().len().max(1);
                     self.pages.free(&ready.placements, &ready.charts.pages().repeat(sides));
+                    if let Some(texels) = &mut self.light_texels {
+                        texels.free(&ready.placements, ready.charts.pages());
+                    }
                     self.texels -= ready.sums.len() as u64;
                     self.gone.push(set.instance);
                 }

@@ -1,6 +1,7 @@
 //! Exactness and truth of the atlas.
 
 mod bent;
+mod lights;
 mod sets;
 
 use dapple_scene::{AlphaMode, Material};

@@ -88,13 +88,15 @@ impl VisibilityAtlas {
     /// Bytes on the heap: tables, sums, texels, charts, and what is being made; not the layout, which the store owns
     /// (15 bytes a point with its values).
     pub fn memory_bytes(&self) -> u64 {
-        let mut bytes = self.pages.bytes() as u64;
+        let lights = self.light_texels.as_ref().map_or(0, |texels| texels.bytes());
+        let mut bytes = (self.pages.bytes() + lights) as u64;
         // Shared ones count once.
         let mut charts = BTreeMap::new();
         for state in &self.sets {
             let SetState::Ready(ready) = state else { continue };
             let bent = ready.bent.as_ref().map_or(0, |bent| bent.bytes());
-            bytes += (ready.table.bytes() + ready.sums.bytes() + bent) as u64;
+            let lights = ready.lights.as_ref().map_or(0, |lights| lights.bytes());
+            bytes += (ready.table.bytes() + ready.sums.bytes() + bent + lights) as u64;
             charts.insert(Arc::as_ptr(&ready.charts), ready.charts.memory_bytes());
         }
         bytes + charts.values().sum::<u64>() + self.job.as_ref().map_or(0, |job| job.memory_bytes())

@@ -1,0 +1,197 @@
+//! What arrives of one light at one place with nothing in the way: irradiance by its form, and the cone that it comes from.
+//!
+//! The twin of `area_lights.wgsl`; equations in `README.md`.
+
+use std::f32::consts::{FRAC_1_PI, PI};
+
+use dapple_scene::area_lights::{LightFigure, LightForm, LightPlace, luminance};
+use glam::Vec3;
+
+/// Light of one light at one place, as a cone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arrival {
+    /// On the surface, W/m², RGB.
+    pub irradiance: Vec3,
+    /// Unit axis of the cone, world.
+    pub direction: Vec3,
+    /// Cosine of the angle between axis and rim, −1 … 1.
+    pub cos_angle: f32,
+}
+
+/// Radii of a flat light away from which it is a point.
+const FAR_RADII: f32 = 20.0;
+/// Radii over the plane of a flat light up to which a place is in it.
+const IN_PLANE_RADII: f32 = 1e-4;
+/// Sine of a cone's angle up to which what is above the horizon of it is that of a disc.
+const NARROW_SINE: f32 = 0.2;
+
+/// `ball` holds the figure.
+pub(super) fn arrive(
+    figure: &LightFigure,
+    ball: (Vec3, f32),
+    position: Vec3,
+    normal: Vec3,
+) -> Option<Arrival> {
+    let vector = match &figure.form {
+        LightForm::Sphere { center, radius } => sphere(*center - position, *radius)?,
+        LightForm::Disc { center, normal, radius } => {
+            let (height, side) = side_of(*normal, position - *center, figure.two_sided, *radius)?;
+            disc(position - *center, height, *normal * side, *radius)
+        }
+        LightForm::Quad { corners, normal } => {
+            let (height, side) = side_of(*normal, position - corners[0], figure.two_sided, ball.1)?;
+            quad(corners, ball, position, height, *normal * side)
+        }
+        LightForm::Places(places) => return from_places(places, figure.two_sided, position, normal),
+    };
+    // The cone of the light's own radiance that has this vector: |m| = π L sin².
+    let length = vector.length();
+    let sin2 = (length * FRAC_1_PI).min(1.0);
+    let axis = vector.try_normalize()?;
+    let cosine = normal.dot(axis);
+    let form_factor = above_horizon(cosine, sin2);
+    if form_factor <= 0.0 {
+        return None;
+    }
+    let (direction, sin2) = raised(axis, normal, cosine, sin2);
+    Some(Arrival {
+        irradiance: figure.radiance * (PI * form_factor),
+        direction,
+        cos_angle: (1.0 - sin2).max(0.0).sqrt(),
+    })
+}
+
+/// Height of a place over the side of a flat light that shines on it, and which that is; `None` behind it or in its plane.
+fn side_of(normal: Vec3, from_light: Vec3, two_sided: bool, radius: f32) -> Option<(f32, f32)> {
+    let height = normal.dot(from_light);
+    let (height, side) = if height < 0.0 && two_sided { (-height, -1.0) } else { (height, 1.0) };
+    (height > IN_PLANE_RADII * radius).then_some((height, side))
+}
+
+// The vectors of forms are ∫ ω dω over what a light fills of all directions.
+
+fn sphere(offset: Vec3, radius: f32) -> Option<Vec3> {
+    let distance2 = offset.length_squared();
+    let r2 = radius * radius;
+    // Nothing is seen from inside.
+    if distance2 <= r2 * 1.000_001 {
+        return None;
+    }
+    Some(offset * (PI * r2 / (distance2 * distance2.sqrt())))
+}
+
+fn disc(from_center: Vec3, height: f32, normal: Vec3, radius: f32) -> Vec3 {
+    let across = from_center - normal * height;
+    let aside = across.length();
+    let (h2, r2) = (height * height, radius * radius);
+    let [near, far] = [aside - radius, aside + radius];
+    // Product of the distances to the nearest and the farthest place of the rim.
+    let rim = ((near * near + h2) * (far * far + h2)).sqrt();
+    let q = h2 + aside * aside;
+    let facing = if q > r2 { 2.0 * r2 * h2 / (rim * (rim + q - r2)) } else { 0.5 * (1.0 + (r2 - q) / rim) };
+    let inwards = 2.0 * height * r2 / (rim * (q + r2 + rim));
+    (normal * facing + across * inwards) * -PI
+}
+
+fn quad(corners: &[Vec3; 4], ball: (Vec3, f32), position: Vec3, height: f32, normal: Vec3) -> Vec3 {
+    let offset = ball.0 - position;
+    let distance2 = offset.length_squared();
+    if distance2 > FAR_RADII * FAR_RADII * ball.1 * ball.1 {
+        let area = 0.5 * (corners[2] - corners[0]).cross(corners[3] - corners[1]).length();
+        return offset * (area * height / (distance2 * distance2));
+    }
+    let to = corners.map(|corner| corner - position);
+    let lengths = to.map(|v| v.length().max(f32::MIN_POSITIVE));
+    let mut sum = Vec3::ZERO;
+    for i in 0..4 {
+        let j = (i + 1) % 4;
+        let both = lengths[i] * lengths[j];
+        let cosine = (to[i].dot(to[j]) / both).clamp(-1.0, 1.0);
+        // The edge itself, not the other corner: so that far corners do not cancel.
+        sum += to[i].cross(corners[j] - corners[i]) * (angle_over_sine(cosine) / both);
+    }
+    // Corners may turn either way.
+    let vector = sum * 0.5;
+    if vector.dot(normal) > 0.0 { -vector } else { vector }
+}
+
+/// Angle / sine by the cosine.
+fn angle_over_sine(cosine: f32) -> f32 {
+    let miss = 1.0 - cosine;
+    if miss < 0.01 {
+        return 1.0 + miss * (1.0 / 3.0 + miss * (2.0 / 15.0));
+    }
+    libm::acosf(cosine) / (1.0 - cosine * cosine).max(1e-8).sqrt()
+}
+
+/// Form factor of what lies above the horizon of a cone whose axis has that cosine and whose angle has that squared sine.
+fn above_horizon(cosine: f32, sin2: f32) -> f32 {
+    let sine = sin2.sqrt();
+    if cosine >= sine {
+        return cosine * sin2;
+    }
+    if cosine <= -sine {
+        return 0.0;
+    }
+    if sine < NARROW_SINE {
+        let q = cosine / sine;
+        let root = (1.0 - q * q).max(0.0).sqrt();
+        return sin2 * sine * FRAC_1_PI * (q * libm::acosf(-q) + root * (2.0 + q * q) * (1.0 / 3.0));
+    }
+    let cos_angle = (1.0 - sin2).max(0.0).sqrt();
+    let level = (1.0 - cosine * cosine).max(1e-12).sqrt();
+    // Turn about the axis at which the rim meets the horizon.
+    let cos_turn = (-cos_angle * cosine / (sine * level)).clamp(-1.0, 1.0);
+    let across = level * (1.0 - cos_turn * cos_turn).max(0.0).sqrt();
+    let rim = sin2 * cosine * libm::acosf(cos_turn) - sine * cos_angle * across;
+    FRAC_1_PI * (rim + libm::atan2f(sine * across, cos_angle)).max(0.0)
+}
+
+/// Axis and squared sine of the cone that is left above the horizon: as high as what is left in the mean, and as large as both extents of it.
+fn raised(axis: Vec3, normal: Vec3, cosine: f32, sin2: f32) -> (Vec3, f32) {
+    let sine = sin2.sqrt();
+    if cosine >= sine {
+        return (axis, sin2);
+    }
+    let half_height = 0.5 * (cosine + sine).max(0.0);
+    ((axis + normal * (half_height - cosine)).normalize_or(normal), sine * half_height)
+}
+
+/// Sums over places, each of which is a small cone.
+fn from_places(places: &[LightPlace], two_sided: bool, position: Vec3, normal: Vec3) -> Option<Arrival> {
+    let (mut irradiance, mut vector, mut fluence) = (Vec3::ZERO, Vec3::ZERO, 0.0f32);
+    for place in places {
+        let offset = place.position_world - position;
+        let distance2 = offset.length_squared();
+        let Some(direction) = offset.try_normalize() else { continue };
+        let facing = -place.normal_world.dot(direction);
+        let facing = if two_sided { facing.abs() } else { facing };
+        if facing <= 0.0 {
+            continue;
+        }
+        // As a disc of its area would be seen from above its middle: never more than half of all directions.
+        let solid_angle = place.area_m2 * facing / (distance2 + place.area_m2 * FRAC_1_PI);
+        let cosine = normal.dot(direction);
+        let sin2 = solid_angle * FRAC_1_PI * (1.0 - 0.25 * FRAC_1_PI * solid_angle);
+        let sine = sin2.sqrt();
+        if cosine <= -sine {
+            continue;
+        }
+        // A place at the horizon is there by the part that is above.
+        let (part, mean_cosine) = match cosine < sine {
+            true => {
+                let above = cosine + sine;
+                (0.5 * above / sine, 0.25 * above * above / sine)
+            }
+            false => (1.0, cosine),
+        };
+        irradiance += place.radiance * (solid_angle * mean_cosine);
+        let share = luminance(place.radiance) * solid_angle * part;
+        fluence += share;
+        vector +=
+            raised(direction, normal, cosine, sin2).0 * (share * (1.0 - 0.25 * FRAC_1_PI * solid_angle));
+    }
+    let direction = vector.try_normalize()?;
+    let cos_angle = (2.0 * vector.length() / fluence - 1.0).clamp(-1.0, 1.0);
+    (irradiance != Vec3::ZERO).then_some(Arrival { irradiance, direction, cos_angle })
+}

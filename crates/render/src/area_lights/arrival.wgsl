@@ -1,0 +1,233 @@
+// What arrives of one area light at one place with nothing in the way. The twin is `area_lights/arrival.rs`, whose constants these are.
+
+const AREA_FAR_RADII: f32 = 20.0;
+const AREA_IN_PLANE_RADII: f32 = 1e-4;
+const AREA_NARROW_SINE: f32 = 0.2;
+const AREA_PI: f32 = 3.1415927;
+
+// Texels of a row of the table: `table.rs`.
+const AREA_FIRST_CORNER: i32 = 3;
+const AREA_FIRST_PLACE: i32 = 3;
+const AREA_SPHERE: i32 = 1;
+const AREA_DISC: i32 = 2;
+const AREA_QUAD: i32 = 3;
+const AREA_PLACES: i32 = 4;
+
+// Light as a cone; nothing arrives where it is black.
+struct AreaArrival {
+    irradiance: vec3<f32>,
+    // Unit axis.
+    direction: vec3<f32>,
+    cos_angle: f32,
+}
+
+fn area_texel(slot: i32, texel: i32) -> vec4<f32> {
+    return textureLoad(area_table, vec2(texel, slot), 0);
+}
+
+fn area_arrival(slot: i32, position: vec3<f32>, normal: vec3<f32>) -> AreaArrival {
+    let nothing = AreaArrival(vec3(0.0), normal, 1.0);
+    // A ball that holds it; what it is and how much it shines; where it faces.
+    let ball = area_texel(slot, 0);
+    let shine = area_texel(slot, 1);
+    let form = i32(shine.w);
+    let offset = ball.xyz - position;
+    // A ball below the horizon.
+    if form == 0 || dot(normal, offset) <= -ball.w {
+        return nothing;
+    }
+    let facing = area_texel(slot, 2);
+    let two_sided = facing.w != 0.0;
+    if form == AREA_PLACES {
+        return area_from_places(slot, i32(facing.x), facing.y != 0.0, two_sided, position, normal, shine.xyz);
+    }
+    var vector: vec3<f32>;
+    if form == AREA_SPHERE {
+        let distance_squared = dot(offset, offset);
+        let radius_squared = ball.w * ball.w;
+        // Nothing is seen from inside.
+        if distance_squared <= radius_squared * 1.000001 {
+            return nothing;
+        }
+        vector = offset * (AREA_PI * radius_squared / (distance_squared * sqrt(distance_squared)));
+    } else {
+        var height = -dot(facing.xyz, offset);
+        if form == AREA_QUAD {
+            height = dot(facing.xyz, position - area_texel(slot, AREA_FIRST_CORNER).xyz);
+        }
+        var front = facing.xyz;
+        if height < 0.0 && two_sided {
+            height = -height;
+            front = -front;
+        }
+        // Behind it, or in its plane.
+        if height <= AREA_IN_PLANE_RADII * ball.w {
+            return nothing;
+        }
+        if form == AREA_DISC {
+            vector = area_disc(-offset, height, front, ball.w);
+        } else {
+            vector = area_quad(slot, ball, position, height, front);
+        }
+    }
+    // The cone of the light's own radiance that has this vector.
+    let length_squared = dot(vector, vector);
+    if length_squared <= 0.0 {
+        return nothing;
+    }
+    let vector_length = sqrt(length_squared);
+    let sin2 = min(vector_length * FRAC_1_PI, 1.0);
+    let axis = vector / vector_length;
+    let cosine = dot(normal, axis);
+    let form_factor = area_above_horizon(cosine, sin2);
+    if form_factor <= 0.0 {
+        return nothing;
+    }
+    let left = area_raised(axis, normal, cosine, sin2);
+    return AreaArrival(shine.xyz * (AREA_PI * form_factor), left.xyz, sqrt(max(1.0 - left.w, 0.0)));
+}
+
+// The vectors of forms are integrals of directions over what a light fills of all directions.
+
+fn area_disc(from_center: vec3<f32>, height: f32, normal: vec3<f32>, radius: f32) -> vec3<f32> {
+    let across = from_center - normal * height;
+    let aside = length(across);
+    let h2 = height * height;
+    let r2 = radius * radius;
+    let near = aside - radius;
+    let far = aside + radius;
+    // Product of the distances to the nearest and the farthest place of the rim.
+    let rim = sqrt((near * near + h2) * (far * far + h2));
+    let q = h2 + aside * aside;
+    var facing = 0.5 * (1.0 + (r2 - q) / rim);
+    if q > r2 {
+        facing = 2.0 * r2 * h2 / (rim * (rim + q - r2));
+    }
+    let inwards = 2.0 * height * r2 / (rim * (q + r2 + rim));
+    return (normal * facing + across * inwards) * -AREA_PI;
+}
+
+fn area_quad(slot: i32, ball: vec4<f32>, position: vec3<f32>, height: f32, normal: vec3<f32>) -> vec3<f32> {
+    let a = area_texel(slot, AREA_FIRST_CORNER).xyz - position;
+    let b = area_texel(slot, AREA_FIRST_CORNER + 1).xyz - position;
+    let c = area_texel(slot, AREA_FIRST_CORNER + 2).xyz - position;
+    let d = area_texel(slot, AREA_FIRST_CORNER + 3).xyz - position;
+    let offset = ball.xyz - position;
+    let distance_squared = dot(offset, offset);
+    if distance_squared > AREA_FAR_RADII * AREA_FAR_RADII * ball.w * ball.w {
+        let area = 0.5 * length(cross(c - a, d - b));
+        return offset * (area * height / (distance_squared * distance_squared));
+    }
+    let vector = (area_edge(a, b) + area_edge(b, c) + area_edge(c, d) + area_edge(d, a)) * 0.5;
+    // Corners may turn either way.
+    return select(vector, -vector, dot(vector, normal) > 0.0);
+}
+
+fn area_edge(a: vec3<f32>, b: vec3<f32>) -> vec3<f32> {
+    let both = max(length(a) * length(b), 1e-30);
+    let cosine = clamp(dot(a, b) / both, -1.0, 1.0);
+    return cross(a, b - a) * (area_angle_over_sine(cosine) / both);
+}
+
+fn area_angle_over_sine(cosine: f32) -> f32 {
+    let miss = 1.0 - cosine;
+    if miss < 0.01 {
+        return 1.0 + miss * (1.0 / 3.0 + miss * (2.0 / 15.0));
+    }
+    return acos(cosine) / sqrt(max(1.0 - cosine * cosine, 1e-8));
+}
+
+// Form factor of what lies above the horizon of a cone whose axis has that cosine and whose angle has that squared sine.
+fn area_above_horizon(cosine: f32, sin2: f32) -> f32 {
+    let sine = sqrt(sin2);
+    if cosine >= sine {
+        return cosine * sin2;
+    }
+    if cosine <= -sine {
+        return 0.0;
+    }
+    if sine < AREA_NARROW_SINE {
+        let q = clamp(cosine / sine, -1.0, 1.0);
+        let root = sqrt(max(1.0 - q * q, 0.0));
+        return sin2 * sine * FRAC_1_PI * (q * acos(-q) + root * (2.0 + q * q) * (1.0 / 3.0));
+    }
+    let cos_angle = sqrt(max(1.0 - sin2, 0.0));
+    let level = sqrt(max(1.0 - cosine * cosine, 1e-12));
+    // Turn about the axis at which the rim meets the horizon.
+    let cos_turn = clamp(-cos_angle * cosine / (sine * level), -1.0, 1.0);
+    let across = level * sqrt(max(1.0 - cos_turn * cos_turn, 0.0));
+    let rim = sin2 * cosine * acos(cos_turn) - sine * cos_angle * across;
+    return FRAC_1_PI * max(rim + atan2(sine * across, cos_angle), 0.0);
+}
+
+// Axis and squared sine of the cone that is left above the horizon.
+fn area_raised(axis: vec3<f32>, normal: vec3<f32>, cosine: f32, sin2: f32) -> vec4<f32> {
+    let sine = sqrt(sin2);
+    if cosine >= sine {
+        return vec4(axis, sin2);
+    }
+    let half_height = 0.5 * max(cosine + sine, 0.0);
+    return vec4(unit_or(axis + normal * (half_height - cosine), normal), sine * half_height);
+}
+
+// Sums over places, each of which is a small cone.
+fn area_from_places(
+    slot: i32,
+    count: i32,
+    is_even: bool,
+    two_sided: bool,
+    position: vec3<f32>,
+    normal: vec3<f32>,
+    mean_radiance: vec3<f32>,
+) -> AreaArrival {
+    var irradiance = vec3(0.0);
+    var vector = vec3(0.0);
+    var fluence = 0.0;
+    for (var i = 0; i < count; i++) {
+        let texel = AREA_FIRST_PLACE + 3 * i;
+        // Place and area; its normal; its radiance, unless all shine alike.
+        let place = area_texel(slot, texel);
+        let offset = place.xyz - position;
+        let distance_squared = dot(offset, offset);
+        if distance_squared == 0.0 {
+            continue;
+        }
+        let direction = offset * inverseSqrt(distance_squared);
+        var facing = -dot(area_texel(slot, texel + 1).xyz, direction);
+        if two_sided {
+            facing = abs(facing);
+        }
+        if facing <= 0.0 {
+            continue;
+        }
+        let solid_angle = place.w * facing / (distance_squared + place.w * FRAC_1_PI);
+        let cosine = dot(normal, direction);
+        let sin2 = solid_angle * FRAC_1_PI * (1.0 - 0.25 * FRAC_1_PI * solid_angle);
+        let sine = sqrt(sin2);
+        if cosine <= -sine {
+            continue;
+        }
+        var part = 1.0;
+        var mean_cosine = cosine;
+        if cosine < sine {
+            let above = cosine + sine;
+            part = 0.5 * above / sine;
+            mean_cosine = 0.25 * above * above / sine;
+        }
+        var radiance = mean_radiance;
+        if !is_even {
+            radiance = area_texel(slot, texel + 2).xyz;
+        }
+        irradiance += radiance * (solid_angle * mean_cosine);
+        let share = dot(radiance, vec3(0.2126, 0.7152, 0.0722)) * solid_angle * part;
+        fluence += share;
+        let left = area_raised(direction, normal, cosine, sin2);
+        vector += left.xyz * (share * (1.0 - 0.25 * FRAC_1_PI * solid_angle));
+    }
+    let vector_length = length(vector);
+    if vector_length <= 0.0 {
+        return AreaArrival(vec3(0.0), normal, 1.0);
+    }
+    let cos_angle = clamp(2.0 * vector_length / fluence - 1.0, -1.0, 1.0);
+    return AreaArrival(irradiance, vector / vector_length, cos_angle);
+}

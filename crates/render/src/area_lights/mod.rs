@@ -1,0 +1,130 @@
+//! Reflects light of area lights by their shapes, with soft shadows from how much of each light points see.
+//!
+//! - takes: shading points ([`crate::shade::shading_points`]), an [`AreaLightTable`] of the moment, and for each point the visible
+//!   fraction of each light ([`VisibilityAtlas::look_up_lights`](crate::psao::atlas::VisibilityAtlas::look_up_lights))
+//! - returns: radiance that each point reflects of them; what surfaces emit themselves is [`crate::shade`]'s
+//!
+//! No ray is traced. Equations, parameters and failure cases in `README.md`.
+
+mod arrival;
+#[cfg(feature = "gpu")]
+pub(crate) mod table;
+#[cfg(test)]
+mod tests;
+
+use dapple_scene::ShadingPoint;
+use dapple_scene::area_lights::{AreaLights, LightFigure};
+use glam::Vec3;
+use rayon::prelude::*;
+
+pub use arrival::Arrival;
+
+use crate::slc::cap::{Cap, Lens};
+
+/// Most lights that are shown.
+pub const MAX_AREA_LIGHTS: usize = 64;
+
+/// Most places that stand for a light that is no simple form.
+pub const MAX_PLACES: usize = 32;
+
+/// Lights that are shown, and their forms at one moment.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct AreaLightTable {
+    /// Ascending.
+    lights: Vec<u32>,
+    entries: Vec<Option<Entry>>,
+}
+
+/// One light that shines.
+#[derive(Clone, Debug, PartialEq)]
+struct Entry {
+    figure: LightFigure,
+    /// Of a ball that holds it.
+    center: Vec3,
+    radius: f32,
+}
+
+impl AreaLightTable {
+    /// The lights of a moment, without the environment: up to [`MAX_AREA_LIGHTS`] all of them, so that each keeps its place while it is dark
+    /// or gone; of more the most powerful ones, of equals the first.
+    pub fn new(lights: &AreaLights<'_>) -> AreaLightTable {
+        let surfaces = lights.len() - usize::from(lights.environment().is_some());
+        let mut shown: Vec<usize> = (0..surfaces).collect();
+        if surfaces > MAX_AREA_LIGHTS {
+            shown.sort_by(|a, b| lights.power_of(*b).total_cmp(&lights.power_of(*a)).then(a.cmp(b)));
+            shown.truncate(MAX_AREA_LIGHTS);
+            shown.sort_unstable();
+        }
+        let entry = |light: &usize| {
+            let figure = lights.figure(*light, MAX_PLACES)?;
+            let (center, radius) = figure.form.ball();
+            (center.is_finite() && radius.is_finite()).then_some(Entry { figure, center, radius })
+        };
+        AreaLightTable {
+            entries: shown.iter().map(entry).collect(),
+            lights: shown.iter().map(|light| *light as u32).collect(),
+        }
+    }
+
+    /// The lights that are shown, by their index in [`AreaLights`], ascending.
+    pub fn lights(&self) -> &[u32] {
+        &self.lights
+    }
+
+    /// Whether no light shines.
+    pub fn is_dark(&self) -> bool {
+        self.entries.iter().all(Option::is_none)
+    }
+
+    /// What arrives of the light at a place of [`AreaLightTable::lights`] on a surface with that unit normal, with nothing in the way;
+    /// `None` if nothing does.
+    pub fn arrival(&self, slot: usize, position_world: Vec3, normal_world: Vec3) -> Option<Arrival> {
+        let entry = self.entries.get(slot)?.as_ref()?;
+        // A ball below the horizon.
+        if normal_world.dot(entry.center - position_world) <= -entry.radius {
+            return None;
+        }
+        arrival::arrive(&entry.figure, (entry.center, entry.radius), position_world, normal_world)
+    }
+}
+
+/// Radiance that points reflect of area lights; 0 where there is no point. `fractions` is asked for the visible fraction, 0 … 1, of each of
+/// [`AreaLightTable::lights`] at the point of an index. In parallel in the caller's rayon pool.
+///
+/// What points emit is not in it: a picture has that already ([`crate::shade::shade`]).
+pub fn shade_area_lights(
+    points: &[Option<ShadingPoint>],
+    table: &AreaLightTable,
+    fractions: impl Fn(usize, &mut [f32]) + Sync,
+) -> Vec<Vec3> {
+    if table.is_dark() {
+        return vec![Vec3::ZERO; points.len()];
+    }
+    let row = || vec![1.0f32; table.lights.len()];
+    let reflect = |row: &mut Vec<f32>, (i, point): (usize, &Option<ShadingPoint>)| match point {
+        Some(point) => {
+            fractions(i, row);
+            reflect_one(point, table, row)
+        }
+        None => Vec3::ZERO,
+    };
+    points.par_iter().enumerate().with_min_len(256).map_init(row, reflect).collect()
+}
+
+fn reflect_one(point: &ShadingPoint, table: &AreaLightTable, fractions: &[f32]) -> Vec3 {
+    let r = &point.reflectance;
+    if r.diffuse == Vec3::ZERO && (r.f0 == Vec3::ZERO || !r.specular) {
+        return Vec3::ZERO;
+    }
+    let lens = Lens::of(point);
+    let mut sum = Vec3::ZERO;
+    for (slot, &fraction) in fractions.iter().enumerate() {
+        if fraction <= 0.0 {
+            continue;
+        }
+        let arrival = table.arrival(slot, point.position_world, point.normal_shading_world);
+        let Some(Arrival { irradiance, direction, cos_angle }) = arrival else { continue };
+        sum += lens.shade_evenly(&Cap { direction, cos_angle, energy: irradiance * fraction });
+    }
+    sum
+}

@@ -1,0 +1,61 @@
+//! The table of lights as texels of floats, as `arrival.wgsl` reads it.
+
+use dapple_scene::area_lights::LightForm;
+use glam::Vec3;
+
+use super::{AreaLightTable, Entry, MAX_PLACES};
+
+/// Texels of a row: one row a light.
+pub(crate) const TABLE_WIDTH: usize = FIRST_PLACE + 3 * MAX_PLACES;
+/// The first texel of a row that is a corner, or of a place.
+const FIRST_PLACE: usize = 3;
+
+// Forms; 0 is a light that does not shine.
+const SPHERE: f32 = 1.0;
+const DISC: f32 = 2.0;
+const QUAD: f32 = 3.0;
+const PLACES: f32 = 4.0;
+
+impl AreaLightTable {
+    /// Row by row; as many rows as [`AreaLightTable::lights`].
+    ///
+    /// A row: centre and radius of a ball that holds the light; radiance and form; normal, or number of places and whether all shine alike, and
+    /// whether both sides do; then corners, or of each place position and area, normal, radiance.
+    pub(crate) fn texels(&self) -> Vec<[f32; 4]> {
+        let mut texels = vec![[0.0; 4]; self.entries.len() * TABLE_WIDTH];
+        for (row, entry) in texels.chunks_exact_mut(TABLE_WIDTH).zip(&self.entries) {
+            if let Some(entry) = entry {
+                write(row, entry);
+            }
+        }
+        texels
+    }
+}
+
+fn write(row: &mut [[f32; 4]], Entry { figure, center, radius }: &Entry) {
+    let four = |v: Vec3, w: f32| [v.x, v.y, v.z, w];
+    let two_sided = f32::from(u8::from(figure.two_sided));
+    row[0] = four(*center, *radius);
+    let (form, facing) = match &figure.form {
+        LightForm::Sphere { .. } => (SPHERE, [0.0; 4]),
+        LightForm::Disc { normal, .. } => (DISC, four(*normal, two_sided)),
+        LightForm::Quad { corners, normal } => {
+            for (texel, corner) in row[FIRST_PLACE..].iter_mut().zip(corners) {
+                *texel = four(*corner, 0.0);
+            }
+            (QUAD, four(*normal, two_sided))
+        }
+        LightForm::Places(places) => {
+            let count = places.len().min(MAX_PLACES);
+            for (texels, place) in row[FIRST_PLACE..].chunks_exact_mut(3).zip(places) {
+                texels[0] = four(place.position_world, place.area_m2);
+                texels[1] = four(place.normal_world, 0.0);
+                texels[2] = four(place.radiance, 0.0);
+            }
+            let is_even = places.iter().all(|place| place.radiance == figure.radiance);
+            (PLACES, [count as f32, f32::from(u8::from(is_even)), 0.0, two_sided])
+        }
+    };
+    row[1] = four(figure.radiance, form);
+    row[2] = facing;
+}

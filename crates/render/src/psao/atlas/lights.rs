@@ -1,0 +1,265 @@
+//! Visibility of lights in the atlas: of each light a sum for each texel, by the weights of visibility.
+
+use dapple_store::charts::{ChartSet, TEXEL_FRACTION, WEIGHT_SUM};
+use dapple_store::light_visibility::{LightChange, LightVisibility, OPEN};
+use dapple_store::points::PointSet;
+use rayon::prelude::*;
+
+use super::resolve::PointTexels;
+use super::light_texels::{LIGHTS_A_TEXEL, LightTexels};
+use super::{DirtyBand, ReadySet, SetState, VisibilityAtlas};
+use crate::gbuffer::Sample;
+
+/// Sum of a texel from which all of a light is seen; fits 16 bits.
+const OPEN_SUM: u16 = OPEN as u16 * WEIGHT_SUM;
+
+/// Exact sums of weight × value, light by light, one a texel of a set; open where no point counts.
+#[derive(Clone, Debug)]
+pub(super) struct LightSums {
+    texels: usize,
+    sums: Vec<u16>,
+}
+
+impl LightSums {
+    fn new(texels: usize, table: &PointTexels, set: &PointSet, lights: &LightVisibility) -> LightSums {
+        let mut open = vec![OPEN_SUM; texels];
+        for point in 0..set.len() {
+            table.for_each_run(point, |texel, weights| open[texel as usize..][..weights.len()].fill(0));
+        }
+        let mut sums = LightSums { texels, sums: Vec::with_capacity(texels * lights.lights() as usize) };
+        for light in 0..lights.lights() {
+            sums.sums.extend_from_slice(&open);
+            let values = &lights.of_light(light)[set.first as usize..][..set.len()];
+            for (point, value) in values.iter().enumerate() {
+                sums.add(table, light, point, i32::from(*value), |_, _| ());
+            }
+        }
+        sums
+    }
+
+    /// Adds the change of a point's value; gives each texel and what it shows now to `shown`.
+    fn add(
+        &mut self,
+        table: &PointTexels,
+        light: u32,
+        point: usize,
+        difference: i32,
+        mut shown: impl FnMut(u32, u8),
+    ) {
+        let Some(sums) = self.sums.get_mut(light as usize * self.texels..) else { return };
+        table.for_each_run(point, |first, weights| {
+            for ((texel, sum), weight) in (first..).zip(&mut sums[first as usize..]).zip(weights) {
+                // The true sum fits; modulo 2¹⁶ the way there does not matter.
+                *sum = sum.wrapping_add(((i32::from(*weight) + 1) * difference) as u16);
+                shown(texel, value_of(*sum));
+            }
+        });
+    }
+
+    /// How much of a light a texel sees, 255 all; `None` if there is no such light.
+    fn at(&self, light: u32, texel: u32) -> Option<u8> {
+        let sum = self.sums.get(light as usize * self.texels + texel as usize)?;
+        Some(value_of(*sum))
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&self.sums[..])
+    }
+}
+
+/// A sum as a texel shows it, 255 all of a light.
+fn value_of(sum: u16) -> u8 {
+    let open = u32::from(OPEN_SUM);
+    ((u32::from(sum) * 255 + open / 2) / open) as u8
+}
+
+/// Up to four texels of a set and how much each counts at a place.
+struct Mix {
+    texels: [(u32, f32); 4],
+    count: usize,
+}
+
+impl ReadySet {
+    /// What a place of a triangle reads, as a card does it.
+    fn mix(&self, triangle: u32, barycentrics: [f32; 2], back: bool) -> Option<Mix> {
+        let charts = &*self.charts;
+        let corners = charts.corners().get(triangle as usize)?;
+        // The back's texels follow the front's.
+        let is_back = back && self.sums.len() > charts.texel_count() as usize;
+        let first = if is_back { charts.texel_count() } else { 0 };
+        let texel = |page: u16, x: u32, y: u32| first + nearest_texel(charts, usize::from(page), x, y);
+        if charts.is_per_vertex() {
+            let [b, c] = barycentrics;
+            let whole = |at: u16| u32::from(at / TEXEL_FRACTION);
+            let [ta, tb, tc] = corners.map(|uv| texel(uv.page, whole(uv.x), whole(uv.y)));
+            return Some(Mix { texels: [(ta, 1.0 - b - c), (tb, b), (tc, c), (ta, 0.0)], count: 3 });
+        }
+        let (page, x, y) = charts.texel_at(triangle as usize, barycentrics);
+        let split = |at: f32| {
+            let at = (at - 0.5).max(0.0);
+            (at as u32, at.fract())
+        };
+        let ((x, fx), (y, fy)) = (split(x), split(y));
+        let texels = [
+            (texel(page, x, y), (1.0 - fx) * (1.0 - fy)),
+            (texel(page, x + 1, y), fx * (1.0 - fy)),
+            (texel(page, x, y + 1), (1.0 - fx) * fy),
+            (texel(page, x + 1, y + 1), fx * fy),
+        ];
+        Some(Mix { texels, count: 4 })
+    }
+}
+
+impl Mix {
+    fn fraction(&self, lights: &LightSums, light: u32) -> Option<f32> {
+        let mut sum = 0.0;
+        for &(texel, weight) in &self.texels[..self.count] {
+            sum += f32::from(lights.at(light, texel)?) * weight;
+        }
+        Some((sum / 255.0).clamp(0.0, 1.0))
+    }
+}
+
+impl VisibilityAtlas {
+    /// Takes in how much of each light all points see, of instances that are ready and have none yet; to be called again when others are.
+    /// 2 bytes a texel and light.
+    ///
+    /// # Panics
+    /// If there are not as many points as in the layout.
+    pub fn resolve_lights(&mut self, lights: &LightVisibility) {
+        assert_eq!(lights.points(), self.layout.len(), "one value a point and light");
+        let sets = self.layout.sets();
+        let taken_in = self.sets.par_iter_mut().zip(sets).map(|(state, set)| match state {
+            SetState::Ready(ready) if ready.lights.is_none() => {
+                ready.lights = Some(LightSums::new(ready.sums.len(), &ready.table, set, lights));
+                true
+            }
+            _ => false,
+        });
+        let taken_in: Vec<bool> = taken_in.collect();
+        if let Some(texels) = &mut self.light_texels {
+            texels.grow(self.pages.texel_count());
+            for (state, _) in self.sets.iter().zip(taken_in).filter(|(_, is_new)| *is_new) {
+                show(texels, state);
+            }
+        }
+    }
+
+    /// Drops what [`VisibilityAtlas::resolve_lights`] took in of all instances, so that it takes in other values: of another set of lights, or
+    /// such as came without their changes.
+    pub fn forget_lights(&mut self) {
+        for state in &mut self.sets {
+            if let SetState::Ready(ready) = state {
+                ready.lights = None;
+            }
+        }
+        if let Some(texels) = &mut self.light_texels {
+            self.sets.iter().for_each(|state| show(texels, state));
+        }
+    }
+
+    /// Keeps texels of these lights from now on, for a card; of none if there are none. Nothing happens if they are those that are kept.
+    ///
+    /// 4 bytes a texel of all layers and four lights.
+    pub fn show_lights(&mut self, lights: &[u32]) {
+        if self.shown_lights() == lights {
+            return;
+        }
+        self.light_texels = (!lights.is_empty()).then(|| {
+            let mut texels = LightTexels::new(self.pages.side(), self.pages.texel_count(), lights);
+            self.sets.iter().for_each(|state| show(&mut texels, state));
+            texels
+        });
+    }
+
+    /// The lights that texels are kept of.
+    pub fn shown_lights(&self) -> &[u32] {
+        self.light_texels.as_ref().map_or(&[], |texels| texels.lights())
+    }
+
+    /// Texels of the shown lights, four lights a group; of each group those of all layers of the atlas, one after the other, rows from the top.
+    /// A texel of 255 sees all of its light. Layers that came since [`VisibilityAtlas::resolve_lights`] was called last are not among them.
+    pub fn light_texels(&self) -> &[Vec<[u8; LIGHTS_A_TEXEL]>] {
+        self.light_texels.as_ref().map_or(&[], |texels| texels.groups())
+    }
+
+    /// Rows of which texels of any group changed since the last call, as [`VisibilityAtlas::take_dirty`] has those of visibility.
+    pub fn take_dirty_lights(&mut self) -> Vec<DirtyBand> {
+        self.light_texels.as_mut().map_or(Vec::new(), LightTexels::take_dirty)
+    }
+
+    /// Takes over changed values where values have been taken in; indices are those of the present layout. Exact, as changes of visibility
+    /// are.
+    pub fn apply_lights(&mut self, changes: &[LightChange]) {
+        let points = self.layout.len() as u32;
+        if points == 0 {
+            return;
+        }
+        let sets = self.layout.sets();
+        for LightChange { index, old, new } in changes {
+            let (light, point) = (index / points, index % points);
+            let at = sets.partition_point(|set| set.first + set.len() as u32 <= point);
+            let Some(set) = sets.get(at) else { continue };
+            let SetState::Ready(ready) = &mut self.sets[at] else { continue };
+            let ReadySet { table, lights: Some(lights), placed, .. } = &mut **ready else { continue };
+            let difference = i32::from(*new) - i32::from(*old);
+            let local = (point - set.first) as usize;
+            let shown = self.light_texels.as_mut().and_then(|texels| Some((texels.slot(light)?, texels)));
+            match shown {
+                Some((slot, texels)) => {
+                    let mut walk = placed.walk();
+                    lights.add(table, light, local, difference, |texel, value| {
+                        texels.write(slot, walk.address(texel).0, value);
+                    });
+                }
+                None => lights.add(table, light, local, difference, |_, _| ()),
+            }
+        }
+    }
+
+    /// How much of a light is seen from a place of a triangle, 0 … 1: a mean of what is seen from the points around it by the weights of
+    /// [`VisibilityAtlas::visibility`]; `None` where nothing is known of it. What changed is there at once: only visibility fades.
+    pub fn light_fraction(
+        &self,
+        instance: u32,
+        triangle: u32,
+        barycentrics: [f32; 2],
+        back: bool,
+        light: u32,
+    ) -> Option<f32> {
+        let ready = self.ready_set(instance)?;
+        ready.mix(triangle, barycentrics, back)?.fraction(ready.lights.as_ref()?, light)
+    }
+
+    /// How much of each of some lights a sample sees, 0 … 1, into `fractions`, one for each of `lights`; 1 where nothing is known of it.
+    ///
+    /// # Panics
+    /// If the lists differ in length.
+    pub fn look_up_lights(&self, sample: &Sample, lights: &[u32], fractions: &mut [f32]) {
+        assert_eq!(lights.len(), fractions.len(), "one fraction a light");
+        fractions.fill(1.0);
+        let Some(ready) = self.ready_set(sample.instance).filter(|_| sample.is_covered()) else { return };
+        let Some(sums) = &ready.lights else { return };
+        let Some(mix) = ready.mix(sample.triangle, sample.barycentrics, sample.is_back_face()) else {
+            return;
+        };
+        for (fraction, light) in fractions.iter_mut().zip(lights) {
+            *fraction = mix.fraction(sums, *light).unwrap_or(1.0);
+        }
+    }
+}
+
+/// Writes the texels of a set that is ready.
+fn show(texels: &mut LightTexels, state: &SetState) {
+    if let SetState::Ready(ready) = state {
+        let count = ready.sums.len() as u32;
+        texels.fill(&ready.charts, &ready.placed, count, |light, texel| ready.lights.as_ref()?.at(light, texel));
+    }
+}
+
+/// Number of a texel of a page, the nearest one that there is.
+pub(super) fn nearest_texel(charts: &ChartSet, page: usize, x: u32, y: u32) -> u32 {
+    let size = charts.pages()[page];
+    let within = |at: u32, size: u16| at.min(u32::from(size).saturating_sub(1));
+    charts.first_texel_of_page(page) + within(y, size.height) * u32::from(size.width) + within(x, size.width)
+}

@@ -1,0 +1,207 @@
+//! A light as a figure: what a client that sends no rays shades with, the same from everywhere.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+
+use super::shape::{Shape, Triangles};
+use super::{AreaLights, luminance};
+
+/// What one light looks like at a moment, with nothing in the way.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightFigure {
+    /// Its form, world.
+    pub form: LightForm,
+    /// Mean radiance over its surface, W/(m² sr), RGB.
+    pub radiance: Vec3,
+    /// Whether it shines from both sides of its surface; spheres do not.
+    pub two_sided: bool,
+}
+
+/// The form of a light, metres, world.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LightForm {
+    /// Shines outwards.
+    Sphere {
+        /// Its centre.
+        center: Vec3,
+        /// > 0.
+        radius: f32,
+    },
+    /// Flat and round.
+    Disc {
+        /// Its centre.
+        center: Vec3,
+        /// Unit, of the side that shines.
+        normal: Vec3,
+        /// > 0.
+        radius: f32,
+    },
+    /// Flat, with four corners around its middle (two may be one).
+    Quad {
+        /// In order.
+        corners: [Vec3; 4],
+        /// Unit, of the side that shines.
+        normal: Vec3,
+    },
+    /// Anything else: places that stand for pieces of its surface, at least one.
+    Places(Vec<LightPlace>),
+}
+
+/// A place that stands for a piece of a light's surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightPlace {
+    /// Metres, world.
+    pub position_world: Vec3,
+    /// Unit, of the side that shines.
+    pub normal_world: Vec3,
+    /// Of the piece, m².
+    pub area_m2: f32,
+    /// Mean over the piece, W/(m² sr), RGB.
+    pub radiance: Vec3,
+}
+
+impl AreaLights<'_> {
+    /// The form of a light, with at most `places` (at least 1) where it is none of the simple ones. `None` for the environment, for what is
+    /// not there, and for what is dark or has no area.
+    ///
+    /// Places are the same at every moment relative to the light, so nothing flickers: with no more triangles than places each triangle is
+    /// cut evenly, else triangles are taken by power.
+    pub fn figure(&self, light: usize, places: usize) -> Option<LightFigure> {
+        let l = self.lights.get(light)?;
+        let figure = |form| Some(LightFigure { form, radiance: l.radiance, two_sided: l.two_sided });
+        if !(luminance(l.radiance) > 0.0 && l.radiance.is_finite()) {
+            return None;
+        }
+        match &l.shape {
+            Shape::Nothing => None,
+            Shape::Sphere { center, radius } => {
+                let form = LightForm::Sphere { center: *center, radius: *radius };
+                Some(LightFigure { form, radiance: l.radiance, two_sided: false })
+            }
+            Shape::Disc { center, normal, radius } => {
+                figure(LightForm::Disc { center: *center, normal: *normal, radius: *radius })
+            }
+            Shape::Rectangle { center, half: [u, v], normal } => {
+                let corners = [*center - *u - *v, *center + *u - *v, *center + *u + *v, *center - *u + *v];
+                figure(LightForm::Quad { corners, normal: *normal })
+            }
+            Shape::Triangles(triangles) => figure(match quad_of(triangles) {
+                Some((corners, normal)) => LightForm::Quad { corners, normal },
+                None => LightForm::Places(self.places_of(triangles, places.max(1))?),
+            }),
+        }
+    }
+
+    /// Places on triangles; `None` if none shines.
+    fn places_of(&self, triangles: &Triangles, most: usize) -> Option<Vec<LightPlace>> {
+        let count = triangles.corners.len();
+        let total = *triangles.weight.last()?;
+        let mut places = Vec::new();
+        if count <= most {
+            // Each is cut into a square number of like pieces, by its share of the power.
+            for i in 0..count {
+                let share = (triangles.own_weight(i) / total * (most - count) as f32) as usize + 1;
+                let side = (share as f32).sqrt() as usize;
+                for piece in 0..side * side {
+                    let corners = subtriangle(triangles.corners[i], side, piece);
+                    let radiance = triangles.mean_emission(self.scene, i, side, piece);
+                    places.extend(LightPlace::of(corners, 1.0, radiance));
+                }
+            }
+        } else {
+            for pick in 0..most {
+                let at = (pick as f32 + 0.5) / most as f32 * total;
+                let i = triangles.weight.partition_point(|sum| *sum <= at).min(count - 1);
+                let radiance = triangles.mean_emission(self.scene, i, 1, 0);
+                // So much of the light's surface shines as this triangle does.
+                let factor = total / (most as f32 * triangles.own_weight(i));
+                places.extend(LightPlace::of(triangles.corners[i], factor, radiance));
+            }
+        }
+        (!places.is_empty()).then_some(places)
+    }
+}
+
+impl LightPlace {
+    /// The middle of a triangle, for so many of its kind.
+    fn of([a, b, c]: [Vec3; 3], factor: f32, radiance: Vec3) -> Option<LightPlace> {
+        let cross = (b - a).cross(c - a);
+        let area_m2 = 0.5 * cross.length() * factor;
+        let normal_world = cross.try_normalize()?;
+        let shines =
+            luminance(radiance) > 0.0 && radiance.is_finite() && area_m2 > 0.0 && area_m2.is_finite();
+        shines.then_some(LightPlace { position_world: (a + b + c) / 3.0, normal_world, area_m2, radiance })
+    }
+}
+
+impl LightForm {
+    /// Centre and radius, metres, of a ball that holds it.
+    pub fn ball(&self) -> (Vec3, f32) {
+        let around = |points: &mut dyn Iterator<Item = Vec3>| {
+            let points: Vec<Vec3> = points.collect();
+            let center = crate::Aabb::from_points(points.iter().copied()).center();
+            (center, points.iter().map(|p| p.distance_squared(center)).fold(0.0, f32::max).sqrt())
+        };
+        match self {
+            LightForm::Sphere { center, radius } | LightForm::Disc { center, radius, .. } => {
+                (*center, *radius)
+            }
+            LightForm::Quad { corners, .. } => around(&mut corners.iter().copied()),
+            LightForm::Places(places) => {
+                let (center, radius) = around(&mut places.iter().map(|place| place.position_world));
+                let widest = places.iter().map(|place| place.area_m2).fold(0.0, f32::max);
+                (center, radius + (widest / PI).sqrt())
+            }
+        }
+    }
+}
+
+/// One of the `side²` like pieces of a triangle.
+fn subtriangle([a, b, c]: [Vec3; 3], side: usize, piece: usize) -> [Vec3; 3] {
+    let [p, q, r] = piece_corners(side, piece).map(|[s, t]| a + (b - a) * s + (c - a) * t);
+    [p, q, r]
+}
+
+/// Its corners by the weights of the second and third corner of the whole.
+pub(super) fn piece_corners(side: usize, piece: usize) -> [[f32; 2]; 3] {
+    // Row `y` has side − y upright pieces and one fewer upside down.
+    let (mut y, mut left) = (0, piece);
+    while left >= 2 * (side - y) - 1 {
+        left -= 2 * (side - y) - 1;
+        y += 1;
+    }
+    let (x, is_turned) = (left / 2, left % 2 == 1);
+    let at = |x: usize, y: usize| [x as f32 / side as f32, y as f32 / side as f32];
+    match is_turned {
+        false => [at(x, y), at(x + 1, y), at(x, y + 1)],
+        true => [at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)],
+    }
+}
+
+/// The four corners of a light of one triangle, or of two that lie in a plane and share a side, and shine evenly.
+fn quad_of(triangles: &Triangles) -> Option<([Vec3; 4], Vec3)> {
+    let is_even = triangles.textured.iter().all(Option::is_none);
+    let is_alike = triangles.plain.iter().all(|radiance| *radiance == triangles.plain[0]);
+    let normal_of = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a).try_normalize();
+    if !is_even || !is_alike {
+        return None;
+    }
+    match triangles.corners[..] {
+        [[a, b, c]] => Some(([a, b, c, c], normal_of([a, b, c])?)),
+        [first, second] => {
+            let normal = normal_of(first)?;
+            if normal.dot(normal_of(second)?) < 1.0 - 1e-5 {
+                return None;
+            }
+            // The corner of the second that is not the first's goes between the two that both have.
+            let apex = second.into_iter().find(|p| !first.contains(p))?;
+            let shared = second.iter().filter(|p| first.contains(p)).count();
+            let lone = first.iter().position(|p| !second.contains(p))?;
+            let [a, b, c] = [0, 1, 2].map(|k| first[(lone + k) % 3]);
+            let is_flat = (apex - b).dot(normal).abs() <= 1e-5 * (apex - b).length();
+            (shared == 2 && is_flat).then_some(([a, b, apex, c], normal))
+        }
+        _ => None,
+    }
+}
