@@ -62,7 +62,10 @@ fn area_lights(scene: &Scene, wanted: bool) -> Option<TrackerParams> {
         tracing::warn!("--area-lights: nothing in this scene emits, so there are none");
     }
     if lights.left_out() > 0 {
-        tracing::warn!("--area-lights: {} meshes emit but have too many triangles to be lights", lights.left_out());
+        tracing::warn!(
+            "--area-lights: {} meshes emit but have too many triangles to be lights",
+            lights.left_out()
+        );
     }
     Some(TrackerParams::default())
 }
