@@ -55,7 +55,8 @@ impl AreaLightTextures {
             let before = self.rows.get(range.clone());
             before.is_none_or(|before| !before.iter().map(bits).eq(rows[range].iter().map(bits)))
         };
-        let changed: Vec<usize> = (0..self.lights as usize).filter(|row| is_first || has_changed(*row)).collect();
+        let changed: Vec<usize> =
+            (0..self.lights as usize).filter(|row| is_first || has_changed(*row)).collect();
         if let (Some(first), Some(last)) = (changed.first(), changed.last()) {
             self.write_rows(gpu, &rows, *first, last + 1);
         }
@@ -103,10 +104,10 @@ impl AreaLightTextures {
         let all: Vec<&[[u8; LIGHTS_A_TEXEL]]> =
             groups.iter().flat_map(|group| group.chunks_exact(area)).collect();
         let of_group = |group: u32| {
-            bands.iter().filter(|band| band.layer < layers).map(move |band| AtlasBand {
-                layer: group * layers + band.layer,
-                ..*band
-            })
+            bands
+                .iter()
+                .filter(|band| band.layer < layers)
+                .map(move |band| AtlasBand { layer: group * layers + band.layer, ..*band })
         };
         // Another number of groups with as many layers in all would take one's layers for another's.
         let is_other = (self.groups, self.layers) != (groups.len() as u32, layers);

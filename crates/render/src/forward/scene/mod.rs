@@ -319,7 +319,10 @@ impl GpuScene {
 
     /// Bytes of vertices, indices, atlas and area lights on the card; textures of materials not counted.
     pub fn bytes(&self) -> u64 {
-        self.meshes.iter().map(GpuMesh::bytes).sum::<u64>() + self.atlas.bytes() + self.inspection.bytes() + self.area_lights.bytes()
+        self.meshes.iter().map(GpuMesh::bytes).sum::<u64>()
+            + self.atlas.bytes()
+            + self.inspection.bytes()
+            + self.area_lights.bytes()
     }
 
     /// Writes everything that moves, and sorts the instances into batches.

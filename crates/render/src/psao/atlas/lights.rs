@@ -5,8 +5,8 @@ use dapple_store::light_visibility::{LightChange, LightVisibility, OPEN};
 use dapple_store::points::PointSet;
 use rayon::prelude::*;
 
-use super::resolve::PointTexels;
 use super::light_texels::{LIGHTS_A_TEXEL, LightTexels};
+use super::resolve::PointTexels;
 use super::{DirtyBand, ReadySet, SetState, VisibilityAtlas};
 use crate::gbuffer::Sample;
 
@@ -253,7 +253,9 @@ impl VisibilityAtlas {
 fn show(texels: &mut LightTexels, state: &SetState) {
     if let SetState::Ready(ready) = state {
         let count = ready.sums.len() as u32;
-        texels.fill(&ready.charts, &ready.placed, count, |light, texel| ready.lights.as_ref()?.at(light, texel));
+        texels.fill(&ready.charts, &ready.placed, count, |light, texel| {
+            ready.lights.as_ref()?.at(light, texel)
+        });
     }
 }
 

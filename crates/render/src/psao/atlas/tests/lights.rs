@@ -37,7 +37,8 @@ fn texels_of(atlas: &VisibilityAtlas, instance: u32) -> Vec<[u8; LIGHTS_A_TEXEL]
     for group in atlas.light_texels() {
         for (place, size) in atlas.placements(instance).iter().zip(charts.pages().iter().cycle()) {
             for y in u32::from(place.y)..u32::from(place.y + size.height) {
-                let start = ((u32::from(place.layer) * atlas.side() + y) * atlas.side() + u32::from(place.x)) as usize;
+                let start = ((u32::from(place.layer) * atlas.side() + y) * atlas.side() + u32::from(place.x))
+                    as usize;
                 texels.extend(&group[start..start + usize::from(size.width)]);
             }
         }
