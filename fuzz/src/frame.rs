@@ -10,8 +10,13 @@ use crate::corpus;
 use crate::input::fingerprint;
 
 /// Small, so that what a few bytes claim stays fast to make.
-const LIMITS: Limits =
-    Limits { max_frame_bytes: 1 << 16, max_points: 1 << 16, max_sets: 256, max_cuts: 1 << 16 };
+const LIMITS: Limits = Limits {
+    max_frame_bytes: 1 << 16,
+    max_points: 1 << 16,
+    max_sets: 256,
+    max_cuts: 1 << 16,
+    max_light_values: 1 << 16,
+};
 
 /// A subscriber that holds the sample store at group 0, epoch 0.
 static HOLDING: LazyLock<Subscriber> = LazyLock::new(|| {
@@ -42,10 +47,12 @@ pub fn decode_frame(data: &[u8]) {
     }
 }
 
-/// Holds two parts: the sample store, and the same points of other instances, with bent normals.
+/// Holds two parts: the sample store, and the same points of other instances, with bent normals; both with two lights.
 static HOLDING_PARTS: LazyLock<Parts> = LazyLock::new(|| {
     let mut parts = Parts::new(None, LIMITS);
-    parts.receive(0, &fingerprint(&corpus::sample())).expect("a sound frame");
+    let lights = corpus::bent_sample().lights().expect("it has some").clone();
+    let first = corpus::sample().with_lights(lights.clone()).expect("of the same points");
+    parts.receive(0, &fingerprint(&first)).expect("a sound frame");
     let sample = corpus::bent_sample();
     let layout = sample.layout();
     let sets = layout.sets().iter().cloned().map(|set| PointSet { instance: set.instance + 10, ..set });
@@ -53,6 +60,7 @@ static HOLDING_PARTS: LazyLock<Parts> = LazyLock::new(|| {
         PointLayout::new(layout.quantum_m(), layout.spacing_m(), sets.collect()).expect("sound sets");
     let other = PointStore::new(layout.into(), sample.visibility().to_vec()).expect("a value a point");
     let other = other.with_bent(sample.bent().expect("it has some").clone()).expect("two bytes a point");
+    let other = other.with_lights(lights).expect("as many points");
     parts.receive(1, &fingerprint(&other)).expect("a sound frame");
     parts
 });
@@ -81,6 +89,12 @@ fn receive_part(frame: &[u8]) {
                             )
                         };
                         assert!((0..set.len() as u32).map(bent).all(|(whole, held)| whole == held));
+                    }
+                    for light in 0..held.light_count() {
+                        let of = |store: &PointStore, first| {
+                            store.lights().map(|l| l.of_light(light)[values(first)].to_vec())
+                        };
+                        assert_eq!(of(whole, place.first), of(held, set.first));
                     }
                 }
             }

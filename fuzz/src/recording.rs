@@ -4,8 +4,13 @@ use dapple_stream::recording::{closing_bytes, parse_closing};
 use dapple_stream::{Limits, Recorder, Recording, Replay};
 
 /// Small, so that what a few bytes claim stays fast to make.
-const LIMITS: Limits =
-    Limits { max_frame_bytes: 1 << 16, max_points: 1 << 16, max_sets: 256, max_cuts: 1 << 16 };
+const LIMITS: Limits = Limits {
+    max_frame_bytes: 1 << 16,
+    max_points: 1 << 16,
+    max_sets: 256,
+    max_cuts: 1 << 16,
+    max_light_values: 1 << 16,
+};
 
 /// Bytes of a piece, where a recording is pushed in pieces.
 const PIECE_BYTES: usize = 13;

@@ -43,6 +43,12 @@ pub(crate) fn run(args: &InspectArgs) -> Result<()> {
         let layout = store.layout();
         let spacing_m = layout.spacing_m();
         say!("points     {} on {} instances, spacing {spacing_m:.4} m", layout.len(), layout.sets().len());
+        if store.bent().is_some() {
+            say!("           with bent normals");
+        }
+        if store.light_count() > 0 {
+            say!("lights     {}: how much of each the points see", store.light_count());
+        }
     }
     let per_second = |bytes: u64| if seconds > 0.0 { bytes as f64 * 8e-3 / seconds } else { 0.0 };
     say!(

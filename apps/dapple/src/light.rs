@@ -2,10 +2,12 @@
 
 use anyhow::{Context, Result, bail};
 use dapple_scene::Scene;
+use dapple_scene::area_lights::AreaLights;
 use dapple_server::{BENT_PRECISION, Progress, Server, ServerConfig};
 use dapple_stream::{Precision, PublisherConfig, Recorder, RecordingHeader};
 use dapple_trace::psao::generate::GenerateParams;
 use dapple_trace::psao::update::{StepInput, UpdateParams};
+use dapple_trace::slc::TrackerParams;
 
 use crate::args::{LightArgs, VisibilityArgs};
 use crate::progress::Bar;
@@ -45,8 +47,24 @@ pub(crate) fn server_config(scene: &Scene, args: &LightArgs) -> Result<ServerCon
         publish: publish(visibility.threshold),
         bits_per_s: args.bits_per_s(),
         max_resident_points: step.max_points,
+        lights: area_lights(scene, args.area_lights),
         ..ServerConfig::default()
     })
+}
+
+/// How visibility of area lights is kept, if that is wanted; says so where there are none.
+fn area_lights(scene: &Scene, wanted: bool) -> Option<TrackerParams> {
+    if !wanted {
+        return None;
+    }
+    let lights = AreaLights::new(scene, &scene.pose(0.0));
+    if lights.is_empty() {
+        tracing::warn!("--area-lights: nothing in this scene emits, so there are none");
+    }
+    if lights.left_out() > 0 {
+        tracing::warn!("--area-lights: {} meshes emit but have too many triangles to be lights", lights.left_out());
+    }
+    Some(TrackerParams::default())
 }
 
 /// How far density follows the gradient of visibility.

@@ -5,8 +5,11 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use dapple_client::Drawn;
 use dapple_metrics::{MetricError, flip, flip_hdr, magma_srgb8, psnr, psnr_masked, ssim};
-use dapple_render::compose::{ErrorKind, ResolvedPlane, resolve_plane, view_error, view_visibility};
+use dapple_render::compose::{
+    ErrorKind, ResolvedPlane, compose, resolve_plane, view_error, view_visibility,
+};
 use dapple_render::image::{Rgb8Image, ToneMap};
+use dapple_render::shade::Shaded;
 use dapple_scene::Scene;
 use dapple_scene::glam::Vec3;
 use dapple_trace::Tracer;
@@ -78,6 +81,16 @@ pub(crate) struct Files {
 impl Shown {
     /// Composes `drawn` with one visibility a sample (all open for `None`), and with other ambient light than its own if there is some.
     pub(crate) fn new(drawn: &Drawn, ambient: Option<&[Vec3]>, visibility: Option<&[f32]>) -> Result<Shown> {
+        Shown::lit(drawn, ambient, None, visibility)
+    }
+
+    /// As [`Shown::new`], with what each sample reflects beside what is drawn.
+    pub(crate) fn lit(
+        drawn: &Drawn,
+        ambient: Option<&[Vec3]>,
+        reflected: Option<&[Vec3]>,
+        visibility: Option<&[f32]>,
+    ) -> Result<Shown> {
         let gbuffer = &drawn.gbuffer;
         let open;
         let samples = match visibility {
@@ -87,7 +100,17 @@ impl Shown {
                 &open
             }
         };
-        let radiance = drawn.compose_with(ambient, visibility)?;
+        let radiance = match reflected {
+            None => drawn.compose_with(ambient, visibility)?,
+            Some(reflected) => {
+                let direct = drawn.shaded.direct.iter().zip(reflected).map(|(drawn, more)| *drawn + *more);
+                let shaded = Shaded {
+                    direct: direct.collect(),
+                    ambient: ambient.unwrap_or(&drawn.shaded.ambient).to_vec(),
+                };
+                compose(&shaded, gbuffer, visibility)?
+            }
+        };
         let beauty = radiance.to_rgb8(&ToneMap::default());
         let visibility = resolve_plane(gbuffer, samples, 1.0)?;
         let covered: Vec<bool> = visibility.coverage.values.iter().map(|&c| c > 0.0).collect();

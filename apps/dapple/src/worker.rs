@@ -13,6 +13,7 @@ use dapple_session::{LightHead, PROTOCOL};
 use dapple_stream::{Precision, PublisherConfig};
 use dapple_trace::psao::generate::GenerateParams;
 use dapple_trace::psao::update::{ConvexVolume, StepInput, UpdateParams};
+use dapple_trace::slc::TrackerParams;
 use tokio::sync::{mpsc, watch};
 
 use crate::args::WorkerArgs;
@@ -278,6 +279,8 @@ fn config(setup: &Setup, shard: Shard) -> ServerConfig {
             ..PublisherConfig::default()
         },
         cuts: setup.cuts,
+        // Exact but for what nobody sees: the host sends on what it gets.
+        lights: setup.area_lights.then(TrackerParams::default),
         shard: Some(shard),
         ..ServerConfig::default()
     }

@@ -18,14 +18,16 @@ pub mod viewer;
 use std::sync::{Arc, OnceLock};
 
 use dapple_render::RenderError;
+use dapple_render::area_lights::{AreaLightTable, shade_area_lights};
 use dapple_render::compose::{compose, compose_with};
 use dapple_render::gbuffer::{GBuffer, rasterize};
 use dapple_render::image::LinearImage;
 use dapple_render::psao::atlas::{AtlasParams, PointChange, VisibilityAtlas};
 use dapple_render::psao::{Kernel, PointIndex, reconstruct};
 use dapple_render::shade::{
-    Gathering, Openings, ShadeParams, Shaded, render_shadow_maps, shade, shade_gathered,
+    Gathering, Openings, ShadeParams, Shaded, render_shadow_maps, shade, shade_gathered, shading_points,
 };
+use dapple_scene::area_lights::AreaLights;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Edits, Pose, PosedCamera, Scene};
 use dapple_store::charts::Cuts;
@@ -118,6 +120,7 @@ impl Client {
                 atlas.begin_update(1.0);
                 atlas.apply(changes.iter().map(|c| PointChange { point: c.point, old: c.old, new: c.new }));
                 atlas.apply_bent(self.subscriber.bent_changes());
+                atlas.apply_lights(self.subscriber.light_changes());
             }
             (Applied::Sets { removed, changes, .. }, atlas) => {
                 self.index = OnceLock::new();
@@ -131,6 +134,7 @@ impl Client {
                         new: c.new,
                     }));
                     atlas.apply_bent(self.subscriber.bent_changes());
+                    atlas.apply_lights(self.subscriber.light_changes());
                     complete(atlas, &self.scene, store);
                 }
             }
@@ -202,6 +206,21 @@ impl Client {
         Some(shade_gathered(scene, pose, camera, gbuffer, shade, gathering))
     }
 
+    /// What each sample reflects of the scene's area lights, each dimmed by how much of it is seen from the points around the sample; of all of
+    /// it where that is not known, as before the first snapshot, and in a stream without lights. What samples emit is not in it. `camera` and
+    /// `shade` are those that it was drawn with.
+    pub fn area_light(&self, drawn: &Drawn, camera: &PosedCamera, shade: &ShadeParams) -> Vec<Vec3> {
+        let (scene, Drawn { pose, gbuffer, .. }) = (&self.scene, drawn);
+        let table = AreaLightTable::new(&AreaLights::new(scene, pose));
+        let points = shading_points(scene, pose, camera, gbuffer, shade.specular);
+        let store = self.subscriber.store().filter(|store| store.lights().is_some());
+        let atlas = store.map(|store| self.atlas_of(store));
+        shade_area_lights(&points, &table, |sample, fractions| match atlas {
+            Some(atlas) => atlas.look_up_lights(&gbuffer.samples()[sample], table.lights(), fractions),
+            None => fractions.fill(1.0),
+        })
+    }
+
     /// The atlas, complete; nothing before the first snapshot.
     pub fn atlas(&self) -> Option<&VisibilityAtlas> {
         self.subscriber.store().map(|store| self.atlas_of(store))
@@ -223,6 +242,9 @@ fn complete(atlas: &mut VisibilityAtlas, scene: &Scene, store: &PointStore) {
     while !atlas.work(scene, store.visibility(), usize::MAX).is_complete() {}
     if let Some(bent) = store.bent() {
         atlas.resolve_bent(bent);
+    }
+    if let Some(lights) = store.lights() {
+        atlas.resolve_lights(lights);
     }
 }
 

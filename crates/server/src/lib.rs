@@ -12,8 +12,10 @@ mod streams;
 
 use std::sync::Arc;
 
+use dapple_scene::area_lights::AreaLights;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Edits, Pose, Scene};
+use dapple_store::light_visibility::LightVisibilityError;
 use dapple_store::points::{LayoutError, PointStore};
 use dapple_stream::{Budget, Frame, Precision, Publisher, PublisherConfig};
 use dapple_trace::Tracer;
@@ -23,6 +25,7 @@ use dapple_trace::psao::generate::{
 };
 use dapple_trace::psao::paper::PaperError;
 use dapple_trace::psao::update::{StepCounts, StepInput, UpdateError, UpdateParams, Updater};
+use dapple_trace::slc::{LightTracker, TrackerParams, VisibilityCounts};
 
 use population::Population;
 use shards::Shard;
@@ -49,6 +52,9 @@ pub struct ServerConfig {
     pub max_resident_points: Option<u32>,
     /// The part of the scene that this server lights; default `None`: all of it.
     pub shard: Option<Shard>,
+    /// Whether, and how, points say how much of each of the scene's area lights they see (5 bits a point and light): then clients draw soft
+    /// shadows of them. Default `None`. A scene without lights has none either way.
+    pub lights: Option<TrackerParams>,
 }
 
 impl ServerConfig {
@@ -91,6 +97,7 @@ impl Default for ServerConfig {
             cuts: true,
             max_resident_points: None,
             shard: None,
+            lights: None,
         }
     }
 }
@@ -149,6 +156,9 @@ pub enum ServerError {
     /// Points that came did not fit those that there are.
     #[error(transparent)]
     Layout(#[from] LayoutError),
+    /// More points and lights than can be held.
+    #[error(transparent)]
+    Lights(#[from] LightVisibilityError),
     /// The paper's table could not be made.
     #[error(transparent)]
     Paper(#[from] PaperError),
@@ -178,6 +188,10 @@ pub struct StepReport {
     pub spawned: u32,
     /// Instances whose points went.
     pub evicted: u32,
+    /// What lights took, in pairs of a point and a light; their rays are among `rays`.
+    pub lights: VisibilityCounts,
+    /// Pairs that may see another part of their light than is known, because the budget of rays did not reach.
+    pub lights_due: u64,
 }
 
 /// A scene that is being lit. A clone goes on from the same state by itself.
@@ -194,6 +208,10 @@ pub struct Server {
     dropped_inside: u32,
     /// Who has points, where there is a cap on them.
     population: Option<Population>,
+    /// How much of each light the points see.
+    lights: Option<LightTracker>,
+    /// The scene as it is now.
+    pose: Pose,
 }
 
 impl Server {
@@ -262,11 +280,29 @@ impl Server {
                 find_cuts(&scene, &pose, &tracer, layout, &|done| progress(Progress::Cutting(done, sets)));
             publisher.set_cuts(layout.clone(), cuts);
         }
-        publisher.publish(updater.store());
+        let lights = match config.lights {
+            Some(params) if !AreaLights::new(&scene, &pose).is_empty() => {
+                let points = (updater.store().layout(), updater.anchors());
+                Some(LightTracker::new(&scene, &pose, &tracer, points, params)?)
+            }
+            _ => None,
+        };
+        publisher.publish(&lit(&updater, lights.as_ref()));
         let streams = vec![Stream { publisher, budget: config.bits_per_s.map(Budget::new) }];
         let tolerance = config.publish.precision.tolerance;
         let (edits, population) = (Edits::new(&scene), None);
-        Ok(Server { scene, edits, tracer, updater, streams, tolerance, dropped_inside, population })
+        Ok(Server {
+            scene,
+            edits,
+            tracer,
+            updater,
+            streams,
+            tolerance,
+            dropped_inside,
+            population,
+            lights,
+            pose,
+        })
     }
 
     /// Brings the scene to `now_s` (seconds) and publishes what changed. Time may run in any direction. Takes as many rays
@@ -295,7 +331,13 @@ impl Server {
         if let Some(population) = &mut self.population {
             evicted = population.turn_over(&self.scene, &mut self.updater, input)?;
         }
-        let report = self.updater.step(&self.scene, &pose, &mut self.tracer, input);
+        // Lights get what ambient light leaves, and where that was not enough, a part of their own.
+        let for_lights = match (&self.lights, input.ray_budget) {
+            (Some(lights), Some(budget)) if lights.due() > 0 => budget / LIGHTS_PART,
+            _ => 0,
+        };
+        let ambient = StepInput { ray_budget: input.ray_budget.map(|rays| rays - for_lights), ..*input };
+        let report = self.updater.step(&self.scene, &pose, &mut self.tracer, &ambient);
         if let Some(population) = &mut self.population {
             spawned = self.updater.take_ready();
             if !spawned.is_empty() {
@@ -305,11 +347,15 @@ impl Server {
                 }
             }
         }
+        let lights = self.step_lights(&pose, input.ray_budget, report.counts.rays())?;
+        self.pose = pose;
         let frame = self.publish_stream(0, sent_s, input.interest);
         Ok(StepReport {
+            lights,
+            lights_due: self.lights.as_ref().map_or(0, |lights| lights.due() as u64),
             frame,
             traced: report.counts.traced(),
-            rays: report.counts.rays(),
+            rays: report.counts.rays() + lights.rays,
             counts: report.counts,
             changed: self.streams[0].publisher.changed(),
             held_back: self.held_back(),
@@ -317,6 +363,21 @@ impl Server {
             spawned: spawned.len() as u32,
             evicted,
         })
+    }
+
+    /// Brings what is known of lights to a pose, with the rays that ambient light left.
+    fn step_lights(
+        &mut self,
+        pose: &Pose,
+        budget: Option<u64>,
+        taken: u64,
+    ) -> Result<VisibilityCounts, ServerError> {
+        let Some(lights) = &mut self.lights else { return Ok(VisibilityCounts::default()) };
+        let (scene, tracer) = (&self.scene, &self.tracer);
+        let points = (self.updater.store().layout(), self.updater.anchors());
+        let came = lights.follow(scene, pose, tracer, points)?;
+        let left = budget.map(|budget| budget.saturating_sub(taken.saturating_add(came.rays)));
+        Ok(came.add(lights.step(scene, pose, tracer, points.1, left)))
     }
 
     /// From the next step on the scene is changed like this. The edits must be ones that [`Edits::check`] lets pass, and every client
@@ -355,9 +416,14 @@ impl Server {
     }
 
     /// What was traced: what has been published is nowhere farther from it than the publisher's tolerance, but for
-    /// [`StepReport::held_back`] points.
+    /// [`StepReport::held_back`] points. Lights are not in it: [`Server::lights`].
     pub fn traced(&self) -> &PointStore {
         self.updater.store()
+    }
+
+    /// What was traced of lights, where it is ([`ServerConfig::lights`]).
+    pub fn lights(&self) -> Option<&LightTracker> {
+        self.lights.as_ref()
     }
 
     /// Where every point is in the world at `pose`, in the order of the store.
@@ -384,6 +450,20 @@ impl Server {
     pub fn bytes_per_point(&self) -> f64 {
         let points = self.store().layout().len().max(1) as f64;
         let published: usize = self.streams.iter().map(|stream| stream.publisher.bytes()).sum();
-        self.updater.bytes_per_point() + published as f64 / points
+        let lights = self.lights.as_ref().map_or(0, LightTracker::bytes);
+        self.updater.bytes_per_point() + (published + lights) as f64 / points
+    }
+}
+
+/// Of the rays of a step lights may take this part before ambient light, as its reciprocal.
+const LIGHTS_PART: u64 = 3;
+
+/// What is to be published: visibility, and where it is known how much of each light the points see.
+fn lit(updater: &Updater, lights: Option<&LightTracker>) -> PointStore {
+    let store = updater.store().clone();
+    match lights {
+        // Both are of the same points: the tracker follows those that come and go before anything is published.
+        Some(lights) => store.clone().with_lights(lights.values().clone()).unwrap_or(store),
+        None => store,
     }
 }

@@ -228,7 +228,7 @@ impl Merger {
             if is_new {
                 stream.publisher.set_cuts(store.layout().clone(), light.cuts().clone());
             }
-            stream.publish(store, &[], sent_s)
+            stream.publish(store, (&[], &[]), sent_s)
         };
         let mut frames: Vec<Option<Frame>> = self.streams.iter_mut().enumerate().map(whole).collect();
         let streams = frames.len();
@@ -263,11 +263,19 @@ impl Merger {
 }
 
 impl Stream {
-    /// Publishes a state of the light, by what it matters where (none for alike everywhere).
-    pub(crate) fn publish(&mut self, store: &PointStore, coarseness: &[f32], sent_s: f64) -> Option<Frame> {
+    /// Publishes a state of the light, by what it matters where (none for alike everywhere), and by how much values of lights may be off.
+    pub(crate) fn publish(
+        &mut self,
+        store: &PointStore,
+        (coarseness, light_tolerances): (&[f32], &[(u32, u8)]),
+        sent_s: f64,
+    ) -> Option<Frame> {
         let Stream { publisher, budget } = self;
-        let Some(budget) = budget else { return publisher.publish(store) };
-        let spending = Spending { most_bytes: Some(budget.allowance(sent_s)), coarseness };
+        let Some(budget) = budget else {
+            let spending = Spending { light_tolerances, ..Spending::default() };
+            return publisher.publish_within(store, &spending);
+        };
+        let spending = Spending { most_bytes: Some(budget.allowance(sent_s)), coarseness, light_tolerances };
         let frame = publisher.publish_within(store, &spending);
         let sent = frame.as_ref().filter(|frame| frame.kind == FrameKind::Delta);
         budget.spend(sent.map_or(0, |frame| frame.bytes.len()));

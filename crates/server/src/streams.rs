@@ -1,9 +1,10 @@
 //! The same light under different budgets of bits.
 
+use dapple_store::points::PointStore;
 use dapple_stream::{Budget, Frame, Publisher, Spending};
 use dapple_trace::psao::update::ConvexVolume;
 
-use crate::Server;
+use crate::{Server, lit};
 
 /// One publisher and what it may spend.
 #[derive(Clone)]
@@ -33,7 +34,15 @@ impl Server {
         let is_limited = self.streams[stream].budget.is_some();
         let coarseness =
             if is_limited { self.updater.coarseness(interest, Spending::STRETCH) } else { Vec::new() };
-        self.streams[stream].publish(self.updater.store(), &coarseness, sent_s)
+        let Some(lights) = &self.lights else {
+            return self.streams[stream].publish(self.updater.store(), (&coarseness, &[]), sent_s);
+        };
+        let held = self.streams[stream].publisher.store().and_then(PointStore::lights);
+        let tolerances = held
+            .filter(|held| held.points() == lights.values().points())
+            .map_or_else(Vec::new, |held| lights.tolerances(held, &self.scene, &self.pose));
+        let store = lit(&self.updater, Some(lights));
+        self.streams[stream].publish(&store, (&coarseness, &tolerances), sent_s)
     }
 
     /// The snapshot that brings a subscriber of a stream up to date. Encoded at most once an update.

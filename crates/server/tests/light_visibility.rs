@@ -5,8 +5,8 @@ use dapple_scene::area_lights::{AreaLights, luminance};
 use dapple_scene::glam::Vec3;
 use dapple_scene::{NoFiles, Pose, Scene, builtin};
 use dapple_store::light_visibility::{LightVisibility, OPEN};
-use dapple_store::points::CellGrid;
-use dapple_stream::light_visibility::{LightLimits, LightPublisher, LightSubscriber};
+use dapple_store::points::{CellGrid, PointLayout, PointStore};
+use dapple_stream::{Limits, Publisher, PublisherConfig, Spending, Subscriber};
 use dapple_trace::psao::generate::{GenerateParams, GeneratedPoints, generate_points};
 use dapple_trace::rtao::Site;
 use dapple_trace::slc::{
@@ -15,6 +15,7 @@ use dapple_trace::slc::{
 };
 use dapple_trace::{Tracer, offset_origin};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 const HZ: f64 = 15.0;
 
@@ -44,6 +45,12 @@ impl World {
         let (points, between) = (lay(goal, 0), lay(4000, 99));
         World { scene, points, between }
     }
+}
+
+/// A store of points that are all open, with these values of lights: what comes of visibility itself costs nothing.
+fn lit(layout: &Arc<PointLayout>, values: &LightVisibility) -> PointStore {
+    let store = PointStore::new(layout.clone(), vec![255; layout.len()]).unwrap();
+    store.with_lights(values.clone()).unwrap()
 }
 
 /// What a run came to.
@@ -169,10 +176,13 @@ fn play(
     let first = AreaLights::new(scene, &pose);
     let mut run = Run { points: layout.len(), lights: first.len(), ..Run::default() };
     let (mut values, _) = trace_visibility(layout, &sites, &tracer, &first, params).unwrap();
-    let mut publisher = LightPublisher::new(layout.clone(), values.clone()).unwrap();
-    let joined = publisher.snapshot();
-    run.join_bytes = joined.len();
-    let mut client = LightSubscriber::join(layout.clone(), &joined, &LightLimits::default()).unwrap();
+    let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
+    let open = PointStore::new(layout.clone(), vec![255; layout.len()]).unwrap();
+    let without = publisher.publish(&open).unwrap().bytes.len();
+    let joined = publisher.publish(&lit(layout, &values)).unwrap().bytes;
+    run.join_bytes = joined.len() - without;
+    let mut client = Subscriber::new(None, Limits::default());
+    client.receive(&joined).unwrap();
     let mut range = None;
     error((scene, &pose, &tracer), &world.between.sites_world(scene, &pose), &mut range, &|_, _, _| {
         Some(1.0)
@@ -189,13 +199,17 @@ fn play(
         let changes = Changes::between(&then, &Moment { scene, pose: &now, lights: &now_lights });
         let (_, counts) = update_visibility(&mut values, (layout, &sites), &tracer, &changes, params);
         let tolerances = value_tolerances(&values, &sites, &now_lights, &tolerated);
-        let body = publisher.delta(&values, &tolerances).unwrap();
+        let tolerances: Vec<(u32, u8)> = (0..).zip(tolerances).collect();
+        let spending = Spending { light_tolerances: &tolerances, ..Spending::default() };
+        let sent = publisher.publish_within(&lit(layout, &values), &spending);
         run.step_s += begun.elapsed().as_secs_f64();
-        let told = client.apply(&body).unwrap();
-        assert_eq!(client.visibility(), publisher.sent(), "frame {frame}");
-        run.sent += told.len();
-        run.bytes += body.len();
-        run.most_bytes = run.most_bytes.max(body.len());
+        if let Some(sent) = sent {
+            client.receive(&sent.bytes).unwrap();
+            assert_eq!(client.store(), publisher.store(), "frame {frame}");
+            run.sent += client.light_changes().len();
+            run.bytes += sent.bytes.len();
+            run.most_bytes = run.most_bytes.max(sent.bytes.len());
+        }
         run.frames += 1;
         run.counts.traced += counts.traced;
         run.counts.changed += counts.changed;
@@ -207,7 +221,7 @@ fn play(
             let posed = (scene, &pose, &tracer);
             let places = world.between.sites_world(scene, &pose);
             let grid = CellGrid::new(&positions(&sites), 1.6 * layout.spacing_m());
-            for (i, held) in [&values, client.visibility()].into_iter().enumerate() {
+            for (i, held) in [&values, client.lights().unwrap()].into_iter().enumerate() {
                 let at = |point: usize, _: &Site, light: usize| held.fraction(point, light as u32);
                 run.at_points[i] += error(posed, &sites, &mut range, &at).powi(2);
                 run.between[i] +=
@@ -244,11 +258,12 @@ fn a_client_sees_what_the_server_traced_and_a_still_scene_sends_nothing() {
     let params = VisibilityParams::default();
     let (mut values, counts) = trace_visibility(layout, &sites, &tracer, &lights, &params).unwrap();
     assert!(counts.traced > 0 && values.values().iter().any(|v| *v > 0 && *v < OPEN));
-    let mut publisher = LightPublisher::new(layout.clone(), values.clone()).unwrap();
+    let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
+    publisher.publish(&lit(layout, &values)).unwrap();
     let nothing = Changes::between(&moment, &moment);
     let (changes, counts) = update_visibility(&mut values, (layout, &sites), &tracer, &nothing, &params);
     assert_eq!((changes.len(), counts), (0, VisibilityCounts::default()));
-    assert!(publisher.delta(&values, &[]).unwrap().is_empty());
+    assert!(publisher.publish(&lit(layout, &values)).is_none());
 }
 
 #[test]

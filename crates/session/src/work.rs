@@ -80,6 +80,9 @@ pub struct Setup {
     pub radius_m: f32,
     /// Whether cuts are looked for.
     pub cuts: bool,
+    /// Whether points say how much of each area light they see.
+    #[serde(default)]
+    pub area_lights: bool,
     /// Part of the time between two steps that one may take, seconds.
     pub step_s: f64,
     /// Rays a step may take; `None` to go by `step_s`.

@@ -6,7 +6,7 @@
 //! the cuts: which points do not count at which texels. Values, and what changed of them, are foretold from neighbours and
 //! written by an entropy coder (`values/`, `entropy/`); a delta builds on the values the receiver holds and on nothing else. Sets
 //! of points that come are a small snapshot of their own ([`sets`]). Bent normals, where a store has them, are two more planes of
-//! values like those of visibility ([`planes`]).
+//! values like those of visibility ([`planes`]); how much of each light points see follows them.
 
 mod columns;
 mod decode;
@@ -27,13 +27,13 @@ pub(crate) use decode::{
 pub(crate) use encode::{EncodedLayout, append_changes, encode_layout, local_bits, snapshot_payload};
 pub(crate) use frame::open;
 pub use frame::{FrameHeader, FrameKind, MAGIC, VERSION, seal};
-pub(crate) use planes::Changes;
+pub(crate) use planes::{Changes, Extras};
 #[cfg(feature = "publish")]
 pub(crate) use planes::{PLANES, planes};
 #[cfg(feature = "publish")]
 pub(crate) use sets::sets_head;
 pub(crate) use sets::{DecodedSets, decode_sets_change};
-pub(crate) use values::{BLOCK, Back, Near, SHARES, Scratch, code_values};
+pub(crate) use values::{BLOCK, Back, Near, SHARES, Scratch};
 #[cfg(feature = "publish")]
 pub(crate) use values::{Fit, Goal, LEAF, Tolerances};
 pub use values::{ValueChange, first_chances};
@@ -44,7 +44,7 @@ use dapple_store::points::LayoutError;
 pub(crate) const MAX_LOCAL_BITS: u32 = 8;
 
 /// What a receiver is willing to take. Every allocation of a decoder is bounded by these, whatever the bytes say:
-/// at most 64 bytes for each of `max_points`, 256 for each of `max_sets`, 32 for each of `max_cuts`, and 8 MiB.
+/// at most 64 bytes for each of `max_points`, 256 for each of `max_sets`, 32 for each of `max_cuts`, 16 for each of `max_light_values`, and 8 MiB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Longest frame, bytes. Default 64 MiB.
@@ -56,11 +56,20 @@ pub struct Limits {
     pub max_sets: u32,
     /// Most texels of which points are cut. Default 2²¹ (2 million; a building of 4 million points has about a tenth).
     pub max_cuts: u32,
+    /// Most values of lights, points × lights. Default 2²³ (8 million; each a byte); at most
+    /// [`MAX_VALUES`](dapple_store::light_visibility::MAX_VALUES) has an effect.
+    pub max_light_values: u32,
 }
 
 impl Default for Limits {
     fn default() -> Limits {
-        Limits { max_frame_bytes: 64 << 20, max_points: 1 << 22, max_sets: 1 << 16, max_cuts: 1 << 21 }
+        Limits {
+            max_frame_bytes: 64 << 20,
+            max_points: 1 << 22,
+            max_sets: 1 << 16,
+            max_cuts: 1 << 21,
+            max_light_values: 1 << 23,
+        }
     }
 }
 

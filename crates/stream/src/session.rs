@@ -6,6 +6,8 @@
 
 #[cfg(feature = "publish")]
 mod budget;
+#[cfg(feature = "publish")]
+mod lights;
 mod parts;
 #[cfg(feature = "publish")]
 mod precision;

@@ -8,6 +8,7 @@ mod cloud;
 use std::sync::LazyLock;
 
 use dapple_store::charts::{Cuts, SetCuts, SiteCut};
+use dapple_store::light_visibility::LightVisibility;
 use dapple_store::points::{Change, PackedNormal, PointLayout, PointSet, PointStore};
 use dapple_stream::codec::seal;
 use dapple_stream::{
@@ -54,12 +55,14 @@ static SETS: LazyLock<Vec<u8>> = LazyLock::new(|| {
     publisher.publish(&next).unwrap().bytes.to_vec()
 });
 
-/// The sample with bent normals: its snapshot (epoch 0), the delta to a later state (1), and a change of sets (2).
+/// The sample with bent normals and two lights: its snapshot (epoch 0), the delta to a later state (1), and a change of sets (2).
 static BENT: LazyLock<[Vec<u8>; 3]> = LazyLock::new(|| {
     let bent = |store: PointStore| {
         let plane = |turn: u8| store.visibility().iter().map(|v| v.rotate_left(turn.into())).collect();
         let planes = [plane(1), plane(3)];
-        store.with_bent(planes).unwrap()
+        let values = (0..2).flat_map(|light| store.visibility().iter().map(move |v| v >> (3 + light)));
+        let lights = LightVisibility::new(store.layout(), 2, values.collect()).unwrap();
+        store.with_bent(planes).unwrap().with_lights(lights).unwrap()
     };
     let store = cloud::hall(3, 3000);
     let mut publisher = Publisher::new([1; 32], PublisherConfig::default());
@@ -224,7 +227,13 @@ fn every_cut_of_a_frame_is_named_so() {
 fn limits_hold() {
     let points = SAMPLE.0.layout().len() as u32;
     let sets = SAMPLE.0.layout().sets().len() as u32;
-    let exact = Limits { max_points: points, max_sets: sets, max_frame_bytes: SAMPLE.1.len(), max_cuts: 600 };
+    let exact = Limits {
+        max_points: points,
+        max_sets: sets,
+        max_frame_bytes: SAMPLE.1.len(),
+        max_cuts: 600,
+        max_light_values: 0,
+    };
     assert_eq!(Subscriber::new(None, exact).receive(&SAMPLE.1), Ok(Applied::NewLayout));
     for limits in [
         Limits { max_points: points - 1, ..exact },
@@ -391,8 +400,8 @@ fn what_breaks_the_rules_of_bent_normals_is_named() {
     };
     // After the base epoch a delta says which planes change.
     let delta = payload(&BENT[1]);
-    assert_eq!(delta[..2], [1, 7]);
-    for (planes, named) in [(0, "planes"), (8, "planes"), (0x47, "planes")] {
+    assert_eq!(delta[..2], [1, 15]);
+    for (planes, named) in [(0, "planes"), (0x10, "planes"), (0x47, "planes")] {
         let mut bytes = delta.clone();
         bytes[1] = planes;
         malformed(&mut bent(1), FrameKind::Delta, 1, &bytes, named);
@@ -405,19 +414,33 @@ fn what_breaks_the_rules_of_bent_normals_is_named() {
     malformed(&mut bent(1), FrameKind::Delta, 1, &delta[..1], "");
     // A plane that is said to change and does not.
     malformed(&mut bent(1), FrameKind::Delta, 1, &[1, 2, 1, 58], "changes");
+    malformed(&mut bent(1), FrameKind::Delta, 1, &[1, 8], "changes of lights' visibility");
     // Sets without bent normals beside sets with some, and the other way round.
     let mut plain = further();
     let with = payload(&BENT[2]);
     malformed(&mut plain, FrameKind::Sets, 13, &with, "bent normals");
     let mut without = with;
     // 1 epoch back, none goes, a varint of two bytes, quantum and spacing.
-    assert!(without[2] >= 0x80 && without[3] < 0x80 && without[12] >= 0x80, "{:x?}", &without[..16]);
+    assert!(without[2] >= 0x80 && without[3] < 0x80 && without[12] >= 0xc0, "{:x?}", &without[..16]);
     without[12] &= 0x7f;
     malformed(&mut bent(2), FrameKind::Sets, 2, &without, "bent normals");
+    // More lights, none, or more than there can be.
+    let mut lights = payload(&BENT[2]);
+    assert_eq!(lights[13], 2);
+    for (count, named) in [(3, "more or fewer lights"), (0, "number of lights: is 0")] {
+        lights[13] = count;
+        malformed(&mut bent(2), FrameKind::Sets, 2, &lights, named);
+    }
+    let mut snapshot = payload(&BENT[0]);
+    let at = 32 + 2 + 9;
+    assert_eq!(snapshot[at], 2);
+    snapshot[at] = 0x7f;
+    let mut few = Subscriber::new(None, Limits { max_light_values: 4000, ..Limits::default() });
+    malformed(&mut few, FrameKind::Snapshot, 0, &snapshot, "values of lights 613029");
     // Bits that mean nothing.
     let mut snapshot = payload(&BENT[0]);
     let flags = 32 + 2 + 8;
-    assert!(snapshot[flags] >= 0x80 && snapshot[flags] & 0x7f <= 8, "{:x?}", &snapshot[32..50]);
-    snapshot[flags] |= 0x40;
+    assert!(snapshot[flags] >= 0xc0 && snapshot[flags] & 0x3f <= 8, "{:x?}", &snapshot[32..50]);
+    snapshot[flags] |= 0x20;
     malformed(&mut Subscriber::new(None, Limits::default()), FrameKind::Snapshot, 0, &snapshot, "local bits");
 }

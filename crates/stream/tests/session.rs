@@ -8,6 +8,7 @@ mod random;
 
 use common::same_bits;
 use dapple_store::charts::{Cuts, SetCuts, SiteCut};
+use dapple_store::light_visibility::{LightChange, OPEN};
 use dapple_store::points::{BentChange, BentNormal, Change, PointLayout, PointStore};
 use dapple_stream::{
     Applied, Frame, FrameKind, IgnoreReason, Limits, Precision, Publisher, PublisherConfig, ReceiveError,
@@ -76,6 +77,16 @@ fn change(store: &mut PointStore, changes: &[(prop::sample::Index, u8)]) {
     };
     let bent: Vec<BentChange> = changes.iter().filter_map(bend).collect();
     store.apply_bent(&bent).unwrap();
+    if let Some(lights) = store.lights().filter(|lights| !lights.values().is_empty()) {
+        let values = lights.values().len();
+        let dim = |change: &Change| {
+            let index = change.point as usize * 7 % values;
+            let new = change.visibility % (OPEN + 1);
+            LightChange { index: index as u32, old: lights.values()[index], new }
+        };
+        let dimmed: Vec<LightChange> = changes.iter().map(dim).collect();
+        store.apply_lights(&dimmed).unwrap();
+    }
 }
 
 /// Lets sets go that are there, and others come: of each instance always the same points, with values by their number.
@@ -135,6 +146,7 @@ fn run(start: &PointStore, steps: &[Step], config: PublisherConfig) -> Run {
         let within = |a: &[u8], b: &[u8], most| a.iter().zip(b).all(|(a, b)| a.abs_diff(*b) <= most);
         let bent_tolerance = config.bent_precision.tolerance;
         assert!(planes.into_iter().all(|(a, b)| within(a, b, bent_tolerance)));
+        assert_eq!(held.lights(), store.lights(), "without tolerances lights are exact");
         assert!(tolerance > 0 || bent_tolerance > 0 || same_bits(held, &store));
         run.states.push(held.clone());
         run.sets += frames.iter().filter(|frame| frame.kind == FrameKind::Sets).count();
@@ -199,6 +211,12 @@ proptest! {
                         prop_assert_ne!(change.old, change.new);
                     }
                     redone.apply_bent(late.bent_changes()).unwrap();
+                    for change in late.light_changes() {
+                        let held = redone.lights().unwrap().values()[change.index as usize];
+                        prop_assert_eq!(held, change.old);
+                        prop_assert_ne!(change.old, change.new);
+                    }
+                    redone.apply_lights(late.light_changes()).unwrap();
                     prop_assert!(same_bits(&redone, late.store().unwrap()));
                 }
             }

@@ -5,6 +5,7 @@
 mod common;
 
 use dapple_store::charts::{Cuts, SetCuts, SiteCut};
+use dapple_store::light_visibility::{LightChange, LightVisibility};
 use dapple_store::points::{BentChange, BentNormal, Change, PointLayout, PointStore};
 use dapple_stream::{Applied, FrameHeader, Limits, Publisher, PublisherConfig, Subscriber, ValueChange};
 
@@ -151,6 +152,29 @@ fn the_bent_vectors_are_those_of_the_encoder_and_decode() {
     let direction = store.bent_of(1).unwrap().unpack(store.layout().sets()[0].normals[1]);
     let expected = glam::Vec3::new(42.0 / 127.0, 22.0 / 127.0, 0.0);
     assert!((direction.truncate() - expected.truncate()).length() < 1e-2 && direction.z > 0.9, "{direction}");
+}
+
+/// The same points with two lights: a shadow comes over three of them, of one light.
+#[test]
+fn the_light_vectors_are_those_of_the_encoder_and_decode() {
+    let points = (0..4).map(|i| ([i, 0, 0], [127, 127])).collect();
+    let layout = PointLayout::new(1.0, 1.0, vec![common::set(0, [0.0; 3], points)]).unwrap();
+    let lights = LightVisibility::new(&layout, 2, vec![31, 31, 20, 0, 31, 31, 31, 31]).unwrap();
+    let store = PointStore::new(layout.into(), vec![255, 200, 200, 255]).unwrap();
+    let mut store = store.with_lights(lights).unwrap();
+    let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
+    let mut subscriber = Subscriber::new(None, Limits::default());
+    let snapshot = publisher.publish(&store).unwrap();
+    let change = |index, old, new| LightChange { index, old, new };
+    let changes = [change(1, 31, 25), change(2, 20, 0), change(6, 31, 0)];
+    store.apply_lights(&changes).unwrap();
+    let delta = publisher.publish(&store).unwrap();
+    assert_eq!(hex(&vector("lights")), hex(&snapshot.bytes));
+    assert_eq!(hex(&vector("shade")), hex(&delta.bytes));
+    assert_eq!(subscriber.receive(&vector("lights")), Ok(Applied::NewLayout));
+    assert_eq!(subscriber.receive(&vector("shade")), Ok(Applied::Changes(Vec::new())));
+    assert_eq!(subscriber.light_changes(), changes);
+    assert!(common::same_bits(subscriber.store().unwrap(), &store));
 }
 
 /// 64 points in a row, all of which go from 0 to 1.

@@ -66,7 +66,7 @@ proptest! {
         let mut store = ends.start.clone();
         for (step, most) in mosts.iter().enumerate() {
             store = cloud::moved(&store, seed.wrapping_add(step as u64), 0.2);
-            let spending = Spending { most_bytes: Some(*most), coarseness: &coarseness };
+            let spending = Spending { most_bytes: Some(*most), coarseness: &coarseness, ..Spending::default() };
             let bytes = ends.publish(&store, &spending);
             prop_assert!(bytes <= *most, "{bytes} of {most}");
             grouped.publish(&store, &spending);
@@ -99,7 +99,7 @@ fn bent_normals_are_within_the_limit_too_and_arrive_in_time() {
     let mut store = start;
     for (seed, most) in [900, 1500, 60, 2500].into_iter().enumerate() {
         store = bent(cloud::moved(&store, seed as u64, 0.2));
-        let bytes = ends.publish(&store, &Spending { most_bytes: Some(most), coarseness: &[] });
+        let bytes = ends.publish(&store, &Spending { most_bytes: Some(most), ..Spending::default() });
         assert!(bytes <= most, "{bytes} of {most}");
         assert!(most < 100 || bytes > most / 3, "{bytes} of {most}");
     }
@@ -117,7 +117,8 @@ fn without_want_a_limit_changes_nothing() {
     for seed in 0..4 {
         store = cloud::moved(&store, seed, 0.02);
         let bytes = free.publish(&store, &Spending::default());
-        let spending = Spending { most_bytes: Some(bytes + 64), coarseness: &coarseness };
+        let spending =
+            Spending { most_bytes: Some(bytes + 64), coarseness: &coarseness, ..Spending::default() };
         assert_eq!(limited.publish(&store, &spending), bytes);
     }
 }
@@ -134,7 +135,7 @@ fn a_limit_that_is_missed_by_little_costs_little() {
             let store = cloud::moved(&free.start, 3, 0.1);
             let bytes = free.publish(&store, &Spending::default());
             let most = (f64::from(bytes as u32) * share) as usize;
-            let spending = Spending { most_bytes: Some(most), coarseness: &scales };
+            let spending = Spending { most_bytes: Some(most), coarseness: &scales, ..Spending::default() };
             let sent = limited.publish(&store, &spending);
             assert!(sent <= most && 2 * sent > most, "{sent} of {most}, {bytes} wanted, {coarseness}");
         }
@@ -155,8 +156,11 @@ fn a_limit_is_used_and_spent_where_it_matters() {
         store = cloud::moved(&store, 50 + seed, 0.15);
         let most = 1200;
         most_of_all += most;
-        used += ends.publish(&store, &Spending { most_bytes: Some(most), coarseness: &coarseness });
-        even.publish(&store, &Spending { most_bytes: Some(most), coarseness: &[] });
+        used += ends.publish(
+            &store,
+            &Spending { most_bytes: Some(most), coarseness: &coarseness, ..Spending::default() },
+        );
+        even.publish(&store, &Spending { most_bytes: Some(most), ..Spending::default() });
     }
     assert!(4 * used > 3 * most_of_all, "{used} of {most_of_all} bytes");
     let half = stretches / 2 * Spending::STRETCH;
@@ -165,7 +169,11 @@ fn a_limit_is_used_and_spent_where_it_matters() {
     assert!(near < 0.8 * evenly_near && far > evenly_far, "{near} {far}, evenly {evenly_near} {evenly_far}");
     // With room again, and nothing new, everything arrives.
     for _ in 0..400 {
-        if ends.publish(&store, &Spending { most_bytes: Some(1200), coarseness: &coarseness }) == 0 {
+        if ends.publish(
+            &store,
+            &Spending { most_bytes: Some(1200), coarseness: &coarseness, ..Spending::default() },
+        ) == 0
+        {
             break;
         }
     }
@@ -181,7 +189,7 @@ fn a_budget_holds_over_every_second_of_a_stream() {
         let now_s = f64::from(step) / 15.0;
         store = cloud::moved(&store, 900 + u64::from(step), 0.1);
         let most_bytes = Some(budget.allowance(now_s));
-        let bytes = ends.publish(&store, &Spending { most_bytes, coarseness: &[] });
+        let bytes = ends.publish(&store, &Spending { most_bytes, ..Spending::default() });
         budget.spend(bytes);
         sent.push(bytes);
     }

@@ -89,7 +89,8 @@ pub(crate) struct Options {
     #[arg(long, value_name = "NAME|INDEX")]
     pub(crate) animation: Option<String>,
     /// Methods to compare: psao, psao-mls, psao-hat (the paper's kernel on the same points; psao-hat-1.5: with 1.5 times its
-    /// radius), psao-paper (the paper's whole scheme; psao-paper-mls: with the fit of psao-mls), sas-B (shading
+    /// radius), psao-paper (the paper's whole scheme; psao-paper-mls: with the fit of psao-mls), slc (psao, and direct light
+    /// of whatever emits by how much of each light points see; all pictures have that light then, those of other methods unshadowed, or by R rays to lights), sas-B (shading
     /// atlas streaming with B pixels of a side to a texel; a program built with `--features sas`), rtao-R (R rays a pixel), ssao
     /// (screen-space occlusion as in Falcor's defaults), alchemy, sao, hbao, hbao-plus, gtao (other screen-space methods), sd-ssao,
     /// sd-hbao, sd-hbao-plus (over a stochastic depth map of 4 samples; sd-hbao-16: of 16; sd-ssao-mv, sd-hbao-plus-mv: of two cameras; sd-hbao-paper: with the

@@ -39,6 +39,8 @@ impl FromStr for RenderMethod {
 pub(crate) enum Method {
     /// Through the visibility atlas.
     Psao,
+    /// The same, and direct light of area lights, whose visibility is streamed along.
+    Slc,
     /// Least squares at every sample.
     PsaoMls,
     /// With the radius in units of the spacing.
@@ -64,7 +66,7 @@ pub(crate) enum Method {
 impl Method {
     /// Whether it depends on points and server rate.
     pub(crate) fn uses_points(self) -> bool {
-        matches!(self, Method::Psao | Method::PsaoMls | Method::PsaoHat { .. }) || self.is_paper()
+        matches!(self, Method::Psao | Method::Slc | Method::PsaoMls | Method::PsaoHat { .. }) || self.is_paper()
     }
 
     /// Whether its server and its stream are the paper's.
@@ -77,6 +79,7 @@ impl std::fmt::Display for Method {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Method::Psao => write!(f, "psao"),
+            Method::Slc => write!(f, "slc"),
             Method::PsaoMls => write!(f, "psao-mls"),
             Method::PsaoHat { radius: 1.0 } => write!(f, "psao-hat"),
             Method::PsaoHat { radius } => write!(f, "psao-hat-{radius}"),
@@ -96,6 +99,7 @@ impl FromStr for Method {
     fn from_str(s: &str) -> Result<Self, Self::Err> {
         match s {
             "psao" => Ok(Method::Psao),
+            "slc" => Ok(Method::Slc),
             "psao-mls" => Ok(Method::PsaoMls),
             "psao-hat" => Ok(Method::PsaoHat { radius: 1.0 }),
             "psao-paper" => Ok(Method::PsaoPaper),
@@ -115,7 +119,7 @@ impl FromStr for Method {
                     (.., Some(bias @ 1..=1024)) => Ok(Method::Sas { bias }),
                     _ => Err(format!(
                         "known methods: psao, psao-mls, psao-hat, psao-hat-F with its radius times F from 0.1 to 8, \
-                         psao-paper, psao-paper-mls, sas-B with B from 1 to 1024, rtao-R with R from 1 to 65536 (rtao-16), \
+                         psao-paper, psao-paper-mls, slc, sas-B with B from 1 to 1024, rtao-R with R from 1 to 65536 (rtao-16), \
                          {}, none",
                         ScreenSpace::KNOWN
                     )),
@@ -133,7 +137,7 @@ mod tests {
     fn methods_are_read_as_they_are_written_and_nonsense_is_refused() {
         assert_eq!("rtao-512".parse(), Ok(Method::Rtao { rays: 512 }));
         let screen = ScreenSpace::ALL.map(Method::Screen);
-        for method in [Method::PsaoPaper, Method::PsaoPaperMls, Method::PsaoHat { radius: 1.5 }]
+        for method in [Method::Slc, Method::PsaoPaper, Method::PsaoPaperMls, Method::PsaoHat { radius: 1.5 }]
             .into_iter()
             .chain(screen)
         {

@@ -11,6 +11,7 @@ Examples:
   dapple record room.glb -o room.dapple
   dapple record --builtin atrium --seconds 10 --hz 15 --points 512 -o atrium.dapple
   dapple record city.glb --radius auto --snapshot-every 2 -o city.dapple
+  dapple record --builtin street --area-lights -o street.dapple
 
 The scene itself is not in the file: who plays it loads the same scene (a built-in one with the same detail).
 docs/recording.md specifies the file.";
@@ -41,6 +42,9 @@ pub(crate) struct LightArgs {
     /// Server updates a second [default: 15, or the preset's].
     #[arg(long, value_name = "H", allow_hyphen_values = true)]
     pub(crate) hz: Option<f64>,
+    /// Points say how much of each area light they see too (whatever emits: 5 bits a point and light), and viewers draw soft shadows of them.
+    #[arg(long)]
+    pub(crate) area_lights: bool,
     #[command(flatten)]
     pub(crate) visibility: VisibilityArgs,
     #[command(flatten)]

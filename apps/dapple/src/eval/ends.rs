@@ -240,7 +240,9 @@ impl AnyClient {
     pub(super) fn visibility(&self, drawn: &Drawn, method: Method) -> Result<Vec<f32>> {
         let hat = |radius| Kernel::Hat(Hat { radius, ..Hat::default() });
         Ok(match (self, method) {
-            (AnyClient::Own(client), Method::Psao) => client.visibility(drawn, &Reconstruction::Atlas),
+            (AnyClient::Own(client), Method::Psao | Method::Slc) => {
+                client.visibility(drawn, &Reconstruction::Atlas)
+            }
             (AnyClient::Own(client), Method::PsaoMls) => client.visibility(drawn, &Kernel::default().into()),
             (AnyClient::Own(client), Method::PsaoHat { radius }) => {
                 client.visibility(drawn, &hat(radius).into())
@@ -259,6 +261,14 @@ impl AnyClient {
             AnyClient::Own(client) => {
                 client.ambient(drawn, &stage.camera_at(drawn), stage.shade(), visibility)
             }
+            _ => None,
+        }
+    }
+
+    /// What each sample reflects of area lights, by how much of them the points around it see.
+    pub(super) fn area_light(&self, drawn: &Drawn, stage: &Stage<'_>) -> Option<Vec<Vec3>> {
+        match self {
+            AnyClient::Own(client) => Some(client.area_light(drawn, &stage.camera_at(drawn), stage.shade())),
             _ => None,
         }
     }

@@ -6,6 +6,8 @@ use anyhow::Result;
 use dapple_client::Drawn;
 use dapple_metrics::Flicker;
 use dapple_render::compose::resolve_plane;
+use dapple_scene::glam::Vec3;
+use dapple_trace::direct::DirectParams;
 use dapple_trace::rtao::{RtaoParams, trace_visibility};
 use serde::{Deserialize, Serialize};
 
@@ -70,7 +72,9 @@ pub(super) fn jobs(stage: &Stage<'_>) -> Vec<Job> {
         for &points_per_m2 in &settings.points_per_m2 {
             for &hz in &settings.hz {
                 let (paper, own): (Vec<Method>, Vec<Method>) = with_points.iter().partition(|m| m.is_paper());
-                for methods in [own, paper].into_iter().filter(|methods| !methods.is_empty()) {
+                // Lights are bits that the others are not to be charged for.
+                let (lit, own): (Vec<Method>, Vec<Method>) = own.into_iter().partition(|m| *m == Method::Slc);
+                for methods in [own, lit, paper].into_iter().filter(|methods| !methods.is_empty()) {
                     jobs.push(Job::Points { points_per_m2, hz, methods });
                 }
             }
@@ -92,7 +96,11 @@ impl Job {
     pub(super) fn name(&self) -> String {
         match self {
             Job::Points { points_per_m2, hz, .. } => {
-                let scheme = if self.is_paper() { "paper" } else { "points" };
+                let scheme = match (self.is_paper(), self.is_lit()) {
+                    (true, _) => "paper",
+                    (_, true) => "lights",
+                    _ => "points",
+                };
                 format!("{scheme}-{points_per_m2}-{hz}hz")
             }
             Job::Served { method, hz } => format!("{method}-{hz}hz"),
@@ -103,6 +111,11 @@ impl Job {
     /// Whether its ends are the paper's.
     fn is_paper(&self) -> bool {
         self.methods().iter().any(|m| m.is_paper())
+    }
+
+    /// Whether its points know of lights.
+    fn is_lit(&self) -> bool {
+        self.methods().contains(&Method::Slc)
     }
 
     /// Whether what its server sends can be kept in a recording.
@@ -147,7 +160,7 @@ impl Job {
     ) -> Result<(Outcome, Option<Vec<u8>>)> {
         let mut pair = match self {
             Job::Points { points_per_m2, hz, .. } => {
-                let start = Start::new(stage, *points_per_m2);
+                let start = Start { area_lights: self.is_lit(), ..Start::new(stage, *points_per_m2) };
                 let server = starts.server(stage, *hz, &start, &|part| progress(0.3 * part))?;
                 let server = AnyServer::new(
                     server,
@@ -156,7 +169,7 @@ impl Job {
                     stage.settings.step.budget.map(|budget| budget.0),
                 )?;
                 let pair = Pair::new(server, (Some(*points_per_m2), *hz), stage, desk.record)?;
-                if self.methods().contains(&Method::Psao) {
+                if self.methods().iter().any(|m| matches!(m, Method::Psao | Method::Slc)) {
                     // Made once a session, so not what a picture costs.
                     pair.client.make_atlas();
                 }
@@ -279,6 +292,29 @@ impl Line {
         Ok(visibility)
     }
 
+    /// What each sample reflects of area lights, where pictures have that: by what the points see, by rays, or with nothing in the way.
+    fn area_light(&mut self, stage: &Stage<'_>, pair: Option<&Pair>, frame: &Frame) -> Option<Vec<Vec3>> {
+        let open = frame.open_light.as_ref()?;
+        let start = Instant::now();
+        let reflected = match (self.method, pair) {
+            (Method::Slc, Some(pair)) => pair.client.area_light(&frame.drawn, stage)?,
+            (Method::Rtao { rays }, _) => {
+                // Other places than the truth's.
+                let params = DirectParams {
+                    samples: stage.settings.rays_per_sample(rays),
+                    seed: u64::from(stage.settings.seed) << 8 | 1,
+                    ..DirectParams::default()
+                };
+                let (reflected, counts) = stage.traced_light(&frame.drawn, &params);
+                self.rays += counts;
+                reflected
+            }
+            _ => return Some(open.clone()),
+        };
+        self.reconstruct_seconds += start.elapsed().as_secs_f64();
+        Some(reflected)
+    }
+
     fn compare(
         &mut self,
         stage: &Stage<'_>,
@@ -290,7 +326,7 @@ impl Line {
         let visibility = self.look(stage, pair, &frame.drawn, frame.time_s)?;
         self.rays += self.rays_of_look;
         let ambient = match (self.method, pair, &visibility) {
-            (Method::Psao, Some(pair), Some(visibility)) => {
+            (Method::Psao | Method::Slc, Some(pair), Some(visibility)) => {
                 let start = Instant::now();
                 let ambient = pair.client.ambient(&frame.drawn, stage, visibility);
                 self.reconstruct_seconds += start.elapsed().as_secs_f64();
@@ -298,7 +334,9 @@ impl Line {
             }
             _ => None,
         };
-        let shown = Shown::new(&frame.drawn, ambient.as_deref(), visibility.as_deref())?;
+        let reflected = self.area_light(stage, pair, frame);
+        let shown =
+            Shown::lit(&frame.drawn, ambient.as_deref(), reflected.as_deref(), visibility.as_deref())?;
         let touched = |pixel: usize| frame.still.touched[pixel];
         let compared = Compared::new(&frame.truth, &shown, desk.judge, stage.settings.hdr_flip, touched)?;
         let stem = format!("{}/{number:03}-{}", desk.folder, self.method);
@@ -381,7 +419,7 @@ impl Line {
             threshold: of_points.map(|s| s.threshold),
             adaptive: of_points.map(|s| s.adaptive).filter(|adaptive| *adaptive > 0.0),
             bent_normals: of_points
-                .filter(|_| self.method == Method::Psao)
+                .filter(|_| matches!(self.method, Method::Psao | Method::Slc))
                 .map(|s| s.bent_normals)
                 .filter(|b| *b),
             gather_ambient: Some(settings.gather_ambient).filter(|gathers| *gathers),

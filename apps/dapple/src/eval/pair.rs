@@ -9,6 +9,7 @@ use dapple_stream::{Recorder, RecordingHeader};
 use dapple_trace::Tracer;
 use dapple_trace::psao::generate::{GenerateParams, generate_points};
 use dapple_trace::psao::update::{ConvexVolume, StepInput, UpdateParams};
+use dapple_trace::slc::TrackerParams;
 
 use super::ends::{AnyClient, AnyServer};
 use super::results::Steps;
@@ -30,6 +31,8 @@ pub(super) struct Start {
     pub(super) max_points: Option<u32>,
     /// How far density follows the gradient of visibility.
     pub(super) adaptive: f32,
+    /// Whether points say how much of each light they see.
+    pub(super) area_lights: bool,
 }
 
 impl Start {
@@ -47,6 +50,7 @@ impl Start {
             seed: settings.seed,
             max_points: settings.step.max_points,
             adaptive: settings.adaptive,
+            area_lights: false,
         }
     }
 
@@ -63,6 +67,7 @@ impl Start {
             update: self.update,
             publish: publish(self.tolerance),
             max_resident_points: self.max_points,
+            lights: self.area_lights.then(TrackerParams::default),
             ..ServerConfig::default()
         }
     }

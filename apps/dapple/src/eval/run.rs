@@ -6,6 +6,7 @@ use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use dapple_scene::area_lights::AreaLights;
 use dapple_scene::{CameraPath, CameraSource};
 use serde_json::json;
 
@@ -199,6 +200,11 @@ impl Run<'_> {
         if let Some(stage) = stages.first()
             && entry.settings.methods.iter().any(|m| m.uses_points())
         {
+            if entry.settings.has_area_lights()
+                && AreaLights::new(&loaded.scene, &loaded.scene.pose(0.0)).is_empty()
+            {
+                bail!("--methods slc: nothing in {} emits, so there is no light to shadow", loaded.title);
+            }
             for &points_per_m2 in &entry.settings.points_per_m2 {
                 Start::new(stage, points_per_m2).check(&loaded.scene)?;
             }
@@ -270,6 +276,7 @@ impl Run<'_> {
             "radius": [stage.radius_m, stage.density_factor],
             "seed": settings.seed,
             "gather_ambient": settings.gather_ambient,
+            "area_lights": settings.has_area_lights(),
         })
     }
 

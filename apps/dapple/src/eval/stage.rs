@@ -5,10 +5,14 @@ use std::rc::Rc;
 
 use anyhow::Result;
 use dapple_client::{Drawn, PictureParams, draw};
+use dapple_render::area_lights::{AreaLightTable, shade_area_lights};
 use dapple_render::gbuffer::GBuffer;
-use dapple_render::shade::{Gathering, Openings, ShadeParams, shade_gathered};
+use dapple_render::shade::{Gathering, Openings, ShadeParams, shade_gathered, shading_points};
+use dapple_scene::area_lights::AreaLights;
+use dapple_scene::glam::Vec3;
 use dapple_scene::{CameraPath, Pose, PosedCamera, Scene};
 use dapple_trace::Tracer;
+use dapple_trace::direct::{DirectParams, trace_direct};
 
 use super::plan::{CLIENT_HZ, Settings};
 use super::still::{StillMap, still_map};
@@ -20,7 +24,7 @@ use crate::source::Loaded;
 /// Pictures are kept while they fit into so many bytes, and drawn again where they do not.
 const MAX_KEPT_BYTES: usize = 3 << 29;
 /// About what a sample takes: what it shows, its light, and the truth.
-const BYTES_A_SAMPLE: usize = 80;
+const BYTES_A_SAMPLE: usize = 92;
 /// Most client frames after a picture in which flicker is watched: a step of a server at 5 Hz. Of slower ones only some steps
 /// are seen, which is as often as they flicker.
 const MAX_WATCHED: u32 = 12;
@@ -39,6 +43,8 @@ pub(super) struct Frame {
     pub(super) watched_s: Vec<f64>,
     /// What stands still in all of them.
     pub(super) still: StillMap,
+    /// What samples would reflect of area lights with nothing in the way, where pictures have that light.
+    pub(super) open_light: Option<Vec<Vec3>>,
 }
 
 pub(super) struct Stage<'a> {
@@ -99,7 +105,8 @@ impl<'a> Stage<'a> {
                 width: settings.size.width,
                 height: settings.size.height,
                 supersample: settings.supersample,
-                shade: Default::default(),
+                // No sun is made up where something else shines.
+                shade: ShadeParams { sun_without_lights: !settings.has_area_lights(), ..Default::default() },
             },
             moving: loaded.scene.moving_instances(),
             tracer: RefCell::new((tracer, None)),
@@ -190,13 +197,43 @@ impl<'a> Stage<'a> {
             let gathering = Gathering { visibility: &traced.visibility, openings };
             shade_gathered(scene, &drawn.pose, &camera, &drawn.gbuffer, self.shade(), gathering)
         });
-        let truth = Shown::new(&drawn, ambient.as_deref(), Some(&traced.visibility))?;
+        let open_light = self.settings.has_area_lights().then(|| {
+            let points = shading_points(scene, &drawn.pose, &camera, &drawn.gbuffer, self.shade().specular);
+            let table = AreaLightTable::new(&AreaLights::new(scene, &drawn.pose));
+            shade_area_lights(&points, &table, |_, fractions| fractions.fill(1.0))
+        });
+        let reflected = open_light.as_ref().map(|_| {
+            let params = DirectParams {
+                samples: self.settings.rays_per_sample(self.settings.reference_rays),
+                seed: u64::from(self.settings.seed) << 8,
+                ..DirectParams::default()
+            };
+            self.traced_light(&drawn, &params).0
+        });
+        let truth =
+            Shown::lit(&drawn, ambient.as_deref(), reflected.as_deref(), Some(&traced.visibility))?;
         // What the client shows first may be a step old: what moved since then is no flicker when it arrives.
         let before =
             (1..=self.client_frames_a_step().min(MAX_WATCHED)).map(|k| time_s - f64::from(k) / CLIENT_HZ);
         let times_s: Vec<f64> = before.filter(|t| *t >= 0.0).chain(watched_s.iter().copied()).collect();
         let still = still_map(scene, &drawn, &times_s, &self.moving, self.radius_m);
-        Ok(Frame { time_s, drawn, truth, noise_mse: traced.noise_mse, watched_s: watched_s.to_vec(), still })
+        let (noise_mse, watched_s) = (traced.noise_mse, watched_s.to_vec());
+        Ok(Frame { time_s, drawn, truth, noise_mse, watched_s, still, open_light })
+    }
+
+    /// What each sample reflects of area lights, by rays; and how many these are.
+    pub(super) fn traced_light(&self, drawn: &Drawn, params: &DirectParams) -> (Vec<Vec3>, u64) {
+        let scene = self.scene();
+        let camera = self.camera_at(drawn);
+        let points = shading_points(scene, &drawn.pose, &camera, &drawn.gbuffer, self.shade().specular);
+        let lights = AreaLights::new(scene, &drawn.pose);
+        let mut radiance = vec![Vec3::ZERO; points.len()];
+        let counts = trace_direct(&self.tracer_at(drawn), &lights, &points, params, &mut radiance);
+        // What surfaces emit is drawn already.
+        for (radiance, point) in radiance.iter_mut().zip(&points) {
+            *radiance = point.as_ref().map_or(Vec3::ZERO, |point| (*radiance - point.emitted).max(Vec3::ZERO));
+        }
+        (radiance, counts.rays)
     }
 
     /// How pictures are shaded.

@@ -104,6 +104,12 @@ impl LightVisibility {
         Ok(LightVisibility { points, lights, values })
     }
 
+    /// Values that were put together from others, so that each is in range.
+    pub(crate) fn carried(points: usize, lights: u32, values: Vec<u8>) -> LightVisibility {
+        debug_assert_eq!(values.len(), points * lights as usize);
+        LightVisibility { points, lights, values }
+    }
+
     /// Number of points of the layout.
     pub fn points(&self) -> usize {
         self.points
@@ -133,6 +139,12 @@ impl LightVisibility {
     /// Visible fraction of a light at a point, 0 … 1; `None` if there is none.
     pub fn fraction(&self, point: usize, light: u32) -> Option<f32> {
         self.get(point, light).map(|value| f32::from(value) / f32::from(OPEN))
+    }
+
+    /// Sets one value, at most [`OPEN`], and tells whether it was another; what has no place is left out.
+    pub fn set(&mut self, index: usize, value: u8) -> bool {
+        let new = value.min(OPEN);
+        self.values.get_mut(index).is_some_and(|held| std::mem::replace(held, new) != new)
     }
 
     /// Sets changed values; all or, if one does not fit, none.

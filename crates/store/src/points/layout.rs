@@ -67,6 +67,14 @@ pub enum LayoutError {
     /// A set that comes is there already.
     #[error("layout: instance {0} has a set already")]
     SetExists(u32),
+    /// Points that come with values of more or fewer lights than those that are there.
+    #[error("layout: points with values of {found} lights do not go with others that have {held}")]
+    OtherLights {
+        /// Lights of the points that are there.
+        held: u32,
+        /// Of those that come.
+        found: u32,
+    },
 }
 
 impl PointLayout {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::layout::MAX_POINTS;
 use super::{BentNormal, LayoutError, PointLayout, PointSet, PointStore};
+use crate::light_visibility::{LightVisibility, OPEN};
 
 /// Which sets make the difference between two layouts of the same lengths. A set whose points differ goes and comes.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -110,7 +111,7 @@ impl PointStore {
     }
 
     /// Values for the points of `layout`: of `added` where that has the set, else this store's, else open. With bent normals if either
-    /// has some; what has none is unbent.
+    /// has some; what has none is unbent. So it is with lights: of as many as the one that has more, and open where it is not known.
     ///
     /// A set with another number of points than here counts as one that is not there.
     pub fn carried(&self, layout: Arc<PointLayout>, added: &PointStore) -> PointStore {
@@ -126,7 +127,8 @@ impl PointStore {
                     (None, Some(range)) => (self, range),
                     (None, None) => (added, 0..0),
                 };
-                values.extend_from_slice(of(store).map_or(&[], |plane| &plane[range]));
+                // Of a light that a store does not have there is nothing.
+                values.extend_from_slice(of(store).and_then(|plane| plane.get(range)).unwrap_or(&[]));
                 values.resize(set.first as usize + set.len(), otherwise);
             }
             values
@@ -137,7 +139,13 @@ impl PointStore {
             carry(&|store| store.bent.as_ref().map(|planes| planes[k].as_slice()), BentNormal::UNBENT.0[k])
         };
         let bent = has_bent.then(|| Box::new([plane(0), plane(1)]));
-        PointStore { layout, visibility, bent }
+        let count = self.light_count().max(added.light_count());
+        let lights = (count > 0).then(|| {
+            let of = |light| carry(&|store| store.lights().map(|lights| lights.of_light(light)), OPEN);
+            let values = (0..count).flat_map(of).collect();
+            Box::new(LightVisibility::carried(layout.len(), count, values))
+        });
+        PointStore { layout, visibility, bent, lights }
     }
 }
 

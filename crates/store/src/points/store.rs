@@ -1,8 +1,9 @@
-//! A layout and the visibility of its points, with or without their bent normals.
+//! A layout and the visibility of its points, with or without their bent normals, and how much of each light they see.
 
 use std::sync::Arc;
 
 use super::{BentChange, BentNormal, BentPlanes, PointLayout};
+use crate::light_visibility::{LightChange, LightVisibility, LightVisibilityError};
 
 /// What one end holds at one epoch.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -10,6 +11,7 @@ pub struct PointStore {
     pub(super) layout: Arc<PointLayout>,
     pub(super) visibility: Vec<u8>,
     pub(super) bent: Option<Box<BentPlanes>>,
+    pub(super) lights: Option<Box<LightVisibility>>,
 }
 
 /// A point's new visibility.
@@ -43,6 +45,12 @@ pub enum StoreError {
     /// A change of bent normals of a store that has none.
     #[error("store: change of bent normals, but there are none")]
     NoBentNormals,
+    /// A change of lights' visibility of a store that has none.
+    #[error("store: change of lights' visibility, but there is none")]
+    NoLights,
+    /// Lights' visibility does not fit.
+    #[error(transparent)]
+    Lights(#[from] LightVisibilityError),
 }
 
 impl PointStore {
@@ -51,7 +59,7 @@ impl PointStore {
         if visibility.len() != layout.len() {
             return Err(StoreError::WrongCount { values: visibility.len(), points: layout.len() });
         }
-        Ok(PointStore { layout, visibility, bent: None })
+        Ok(PointStore { layout, visibility, bent: None, lights: None })
     }
 
     /// The same with bent normals, two bytes a point in as many lists.
@@ -61,6 +69,19 @@ impl PointStore {
             return Err(StoreError::WrongCount { values: plane.len(), points });
         }
         Ok(PointStore { bent: Some(Box::new(bent)), ..self })
+    }
+
+    /// The same with how much of each light the points see; at least one light.
+    ///
+    /// # Errors
+    /// It is of another number of points, or of no light.
+    pub fn with_lights(self, lights: LightVisibility) -> Result<PointStore, StoreError> {
+        let points = self.layout.len();
+        if lights.points() != points || lights.lights() == 0 {
+            let (values, lights) = (lights.values().len(), lights.lights());
+            return Err(LightVisibilityError::WrongCount { values, points, lights }.into());
+        }
+        Ok(PointStore { lights: Some(Box::new(lights)), ..self })
     }
 
     /// Where the points lie.
@@ -84,9 +105,20 @@ impl PointStore {
         Some(BentNormal([*first.get(point)?, *second.get(point)?]))
     }
 
+    /// How much of each light the points see, if that is held.
+    pub fn lights(&self) -> Option<&LightVisibility> {
+        self.lights.as_deref()
+    }
+
+    /// Of how many lights that is; 0 where it is not held.
+    pub fn light_count(&self) -> u32 {
+        self.lights().map_or(0, LightVisibility::lights)
+    }
+
     /// Bytes held beside the layout, which is shared.
     pub fn value_bytes(&self) -> usize {
-        self.visibility.len() + self.bent().map_or(0, |planes| planes.iter().map(Vec::len).sum())
+        let bent: usize = self.bent().map_or(0, |planes| planes.iter().map(Vec::len).sum());
+        self.visibility.len() + bent + self.lights().map_or(0, |lights| lights.values().len())
     }
 
     /// Applies changes; all or, if one is out of range, none.
@@ -115,5 +147,13 @@ impl PointStore {
             [first[change.point as usize], second[change.point as usize]] = change.new.0;
         }
         Ok(())
+    }
+
+    /// Applies changes of lights' visibility, of which only what is new counts; all or, if one does not fit, none.
+    pub fn apply_lights(&mut self, changes: &[LightChange]) -> Result<(), StoreError> {
+        if changes.is_empty() {
+            return Ok(());
+        }
+        Ok(self.lights.as_deref_mut().ok_or(StoreError::NoLights)?.apply(changes)?)
     }
 }

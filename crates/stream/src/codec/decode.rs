@@ -3,16 +3,18 @@
 use std::sync::Arc;
 
 use dapple_store::charts::{Cuts, SetCuts, SiteCut};
+use dapple_store::light_visibility::{LightVisibility, MAX_LIGHTS, MAX_VALUES, OPEN};
 use dapple_store::points::{MAX_POINTS, PointLayout, PointSet, PointStore};
 use glam::Vec3;
 
 use super::MAX_LOCAL_BITS;
 use super::columns::{CutColumns, PointColumns};
 use super::entropy::{self, Coder};
-use super::planes::{Changes, HAS_BENT, PLANES, planes};
+use super::planes::{Changes, Extras, HAS_BENT, HAS_LIGHTS, LIGHTS_CHANGE, PLANES, planes};
 use super::values::{Guide, MOST_FOLLOW, Near, Scale, Scratch, code_changes, code_values};
 use super::varint::Reader;
 use super::{DecodeError, Limits};
+use crate::light_visibility::code_light_changes;
 
 /// The parts of a snapshot, the large ones still encoded.
 pub(crate) struct SnapshotParts<'a> {
@@ -33,8 +35,8 @@ pub(crate) struct DecodedLayout {
     pub(crate) cuts: Cuts,
     /// Bits of a coordinate within its cell.
     pub(crate) local_bits: u32,
-    /// Whether values come with bent normals.
-    pub(crate) has_bent: bool,
+    /// What comes with the values.
+    pub(crate) extras: Extras,
 }
 
 pub(crate) fn parse_snapshot(payload: &[u8]) -> Result<SnapshotParts<'_>, DecodeError> {
@@ -52,11 +54,18 @@ pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<DecodedLayo
     let quantum_m = reader.f32("layout lengths")?;
     let spacing_m = reader.f32("layout lengths")?;
     let flags = reader.byte("layout local bits")?;
-    let (local_bits, has_bent) = (u32::from(flags & !HAS_BENT), flags & HAS_BENT != 0);
+    let (local_bits, has_bent) = (u32::from(flags & !(HAS_BENT | HAS_LIGHTS)), flags & HAS_BENT != 0);
     if local_bits > MAX_LOCAL_BITS {
         return Err(bad("layout local bits", "exceed 8"));
     }
+    let lights = if flags & HAS_LIGHTS != 0 { decode_light_count(&mut reader)? } else { 0 };
+    let extras = Extras { has_bent, lights };
     let (mut sets, counts) = decode_sets(&mut reader, limits)?;
+    let values = counts.iter().map(|count| *count as u64).sum::<u64>() * u64::from(lights);
+    let limit = u64::from(limits.max_light_values).min(MAX_VALUES as u64);
+    if values > limit {
+        return Err(DecodeError::TooLarge { what: "values of lights", value: values, limit });
+    }
     let (mut cut_sets, cut_counts) = decode_cut_sets(&mut reader, limits)?;
     // No more room is made than these bytes can well fill.
     let most = 8 * reader.len() + 64;
@@ -105,7 +114,20 @@ pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<DecodedLayo
     // A mask of 0 is found here.
     let cuts = Cuts::new(cut_sets).map_err(|error| bad("cut masks", error.reason))?;
     let layout = PointLayout::new(quantum_m, spacing_m, sets)?;
-    Ok(DecodedLayout { layout, cuts, local_bits, has_bent })
+    Ok(DecodedLayout { layout, cuts, local_bits, extras })
+}
+
+fn decode_light_count(reader: &mut Reader<'_>) -> Result<u32, DecodeError> {
+    let count = reader.varint("number of lights")?;
+    if count == 0 {
+        return Err(DecodeError::Malformed { part: "number of lights", reason: "is 0" });
+    }
+    let limit = u64::from(MAX_LIGHTS);
+    u32::try_from(count).ok().filter(|count| *count <= MAX_LIGHTS).ok_or(DecodeError::TooLarge {
+        what: "lights",
+        value: count,
+        limit,
+    })
 }
 
 /// The table of sets of cuts, still without cuts, and how many each has: together within the limits.
@@ -181,22 +203,35 @@ pub(crate) fn decode_values(
     bytes: &[u8],
     layout: Arc<PointLayout>,
     near: &Near,
-    has_bent: bool,
+    extras: Extras,
 ) -> Result<PointStore, DecodeError> {
     let bad = |reason| DecodeError::Malformed { part: "values", reason };
     let mut reader = entropy::Reader::new(bytes);
     let mut plane = || code_values(&mut reader, &layout, near, |_| 0).map_err(bad);
     let visibility = plane()?;
-    let bent = if has_bent { Some([plane()?, plane()?]) } else { None };
+    let bent = if extras.has_bent { Some([plane()?, plane()?]) } else { None };
+    let mut lights = Vec::with_capacity(layout.len() * extras.lights as usize);
+    for _ in 0..extras.lights {
+        let values = plane()?;
+        if values.iter().any(|value| *value > OPEN) {
+            return Err(bad("of a light exceed that of one of which all is seen"));
+        }
+        lights.extend(values);
+    }
     if !reader.is_complete() {
         return Err(bad("have bytes after their end"));
     }
     let misfit = |_| bad("do not fit the layout");
-    let store = PointStore::new(layout, visibility).map_err(misfit)?;
-    match bent {
-        Some(bent) => store.with_bent(bent).map_err(misfit),
-        None => Ok(store),
+    let mut store = PointStore::new(layout.clone(), visibility).map_err(misfit)?;
+    if let Some(bent) = bent {
+        store = store.with_bent(bent).map_err(misfit)?;
     }
+    if extras.lights > 0 {
+        let lights = LightVisibility::new(&layout, extras.lights, lights);
+        let lights = lights.map_err(|_| bad("of lights do not fit the layout"))?;
+        store = store.with_lights(lights).map_err(misfit)?;
+    }
+    Ok(store)
 }
 
 /// Splits the payload of a delta whose frame carries `epoch`.
@@ -233,8 +268,11 @@ pub(crate) fn decode_changes(
 ) -> Result<Changes, DecodeError> {
     let bad = |part, reason| DecodeError::Malformed { part, reason };
     let mut reader = parts.changes;
-    let which = if held.bent().is_some() { reader.byte("planes")? } else { 1 };
-    if which == 0 || which >> PLANES != 0 {
+    let extras = Extras::of(held);
+    let which = if extras.is_any() { reader.byte("planes")? } else { 1 };
+    let bent = if extras.has_bent { (1 << PLANES) - 2 } else { 0 };
+    let there_are = 1 | bent | if extras.lights > 0 { LIGHTS_CHANGE } else { 0 };
+    if which == 0 || which & !there_are != 0 {
         return Err(bad("planes", "are none, or others than there are"));
     }
     let mut scales = [None; PLANES];
@@ -258,8 +296,16 @@ pub(crate) fn decode_changes(
             return Err(bad("changes", "are none"));
         }
     }
+    let mut light_changes = Vec::new();
+    if let Some(lights) = held.lights().filter(|_| which & LIGHTS_CHANGE != 0) {
+        light_changes = code_light_changes(&mut coded, (held.layout(), near), lights.values(), None)
+            .ok_or(bad("changes of lights' visibility", "end early"))?;
+        if light_changes.is_empty() {
+            return Err(bad("changes of lights' visibility", "are none"));
+        }
+    }
     if !coded.is_complete() {
         return Err(bad("changes", "have bytes after their end"));
     }
-    Ok(Changes::new(changes, held))
+    Ok(Changes::new(changes, light_changes, held))
 }

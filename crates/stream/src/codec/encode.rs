@@ -6,9 +6,10 @@ use dapple_store::points::{PointLayout, PointStore};
 use super::MAX_LOCAL_BITS;
 use super::columns::{CutColumns, PointColumns};
 use super::entropy::Writer;
-use super::planes::{Changes, HAS_BENT, PLANES, planes};
+use super::planes::{Changes, Extras, HAS_BENT, HAS_LIGHTS, LIGHTS_CHANGE, PLANES, planes};
 use super::values::{Fit, Goal, Near, Scratch, code_changes, code_values};
 use super::varint::write_varint;
+use crate::light_visibility::code_light_changes;
 
 /// The layout part of a snapshot with the cuts that belong to it.
 #[derive(Clone, Debug)]
@@ -20,13 +21,18 @@ pub(crate) struct EncodedLayout {
     pub(crate) local_bits: u32,
 }
 
-/// The layout part of a snapshot, which says whether bent normals come with the values.
-pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts, has_bent: bool) -> EncodedLayout {
+/// The layout part of a snapshot, which says what comes with the values.
+pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts, extras: Extras) -> EncodedLayout {
     let local_bits = local_bits(layout);
     let mut out = Vec::new();
     out.extend(layout.quantum_m().to_le_bytes());
     out.extend(layout.spacing_m().to_le_bytes());
-    out.push(local_bits as u8 | if has_bent { HAS_BENT } else { 0 });
+    let bent = if extras.has_bent { HAS_BENT } else { 0 };
+    let lights = if extras.lights > 0 { HAS_LIGHTS } else { 0 };
+    out.push(local_bits as u8 | bent | lights);
+    if extras.lights > 0 {
+        write_varint(&mut out, u64::from(extras.lights));
+    }
     write_varint(&mut out, layout.sets().len() as u64);
     let mut next_instance = 0;
     for set in layout.sets() {
@@ -89,24 +95,28 @@ pub(crate) fn snapshot_payload(
 /// The values of a snapshot, appended to `out`.
 pub(super) fn append_values(out: Vec<u8>, near: &Near, store: &PointStore) -> Vec<u8> {
     let mut writer = Writer::new(out);
-    for plane in planes(store) {
+    let lights = store.lights();
+    let lights = lights.into_iter().flat_map(|lights| (0..lights.lights()).map(|l| lights.of_light(l)));
+    for plane in planes(store).chain(lights) {
         code_values(&mut writer, store.layout(), near, |point| plane[point]).expect("only reading fails");
     }
     writer.finish()
 }
 
-/// What a delta has after its base, appended to `out`: `held` to within the goals of its planes, of which one at least is set. Where
-/// there are no bent normals, theirs are not.
+/// What a delta has after its base, appended to `out`: `held` to within the goals of its planes, and to these values of lights, of which one at
+/// least is set. What the store does not have, is not.
 pub(crate) fn append_changes(
     mut out: Vec<u8>,
     near: &mut Near,
     held: &PointStore,
     mut goals: [Option<Goal<'_>>; PLANES],
+    lights: Option<&[u8]>,
     fits: &mut [Fit; PLANES],
     scratch: &mut Scratch,
 ) -> (Vec<u8>, Changes) {
-    if held.bent().is_some() {
-        out.push((0..).zip(&goals).map(|(plane, goal)| u8::from(goal.is_some()) << plane).sum());
+    if Extras::of(held).is_any() {
+        let planes: u8 = (0..).zip(&goals).map(|(plane, goal)| u8::from(goal.is_some()) << plane).sum();
+        out.push(planes | if lights.is_some() { LIGHTS_CHANGE } else { 0 });
     }
     for (goal, fit) in goals.iter().zip(&*fits) {
         out.extend(goal.iter().flat_map(|goal| {
@@ -123,7 +133,10 @@ pub(crate) fn append_changes(
         changes[k] = coded.unwrap_or_default();
         fits[k].learn(goal);
     }
-    (writer.finish(), Changes::new(changes, held))
+    let lights = lights.zip(held.lights()).and_then(|(wanted, lights)| {
+        code_light_changes(&mut writer, (held.layout(), near), lights.values(), Some(wanted))
+    });
+    (writer.finish(), Changes::new(changes, lights.unwrap_or_default(), held))
 }
 
 /// Bits of a coordinate within its cell, so that a cell is about as large as the points are apart: then most

@@ -1,5 +1,7 @@
-//! The bytes of a point, each kind in a plane of its own: visibility, and the two of a bent normal if there are any.
+//! The bytes of a point, each kind in a plane of its own: visibility, and the two of a bent normal if there are any. What is held of lights
+//! comes after them.
 
+use dapple_store::light_visibility::LightChange;
 use dapple_store::points::{BentChange, BentNormal, PointStore};
 
 use super::values::ValueChange;
@@ -9,6 +11,32 @@ pub(crate) const PLANES: usize = 3;
 
 /// In the byte that says how many bits of a coordinate are local: values come with bent normals.
 pub(super) const HAS_BENT: u8 = 0x80;
+
+/// In the same byte: how many lights there are values of comes after it.
+pub(super) const HAS_LIGHTS: u8 = 0x40;
+
+/// In the byte that says which planes of a delta change: so do values of lights.
+pub(super) const LIGHTS_CHANGE: u8 = 1 << PLANES;
+
+/// What comes with visibility.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Extras {
+    /// Bent normals.
+    pub(crate) has_bent: bool,
+    /// Values of so many lights.
+    pub(crate) lights: u32,
+}
+
+impl Extras {
+    pub(crate) fn of(store: &PointStore) -> Extras {
+        Extras { has_bent: store.bent().is_some(), lights: store.light_count() }
+    }
+
+    /// Whether a delta says which planes change.
+    pub(super) fn is_any(self) -> bool {
+        self != Extras::default()
+    }
+}
 
 /// The planes of a store.
 pub(crate) fn planes(store: &PointStore) -> impl Iterator<Item = &[u8]> {
@@ -20,15 +48,18 @@ pub(crate) fn planes(store: &PointStore) -> impl Iterator<Item = &[u8]> {
 pub(crate) struct Changes {
     pub(crate) visibility: Vec<ValueChange>,
     pub(crate) bent: Vec<BentChange>,
+    /// In order of index.
+    pub(crate) lights: Vec<LightChange>,
 }
 
 impl Changes {
-    /// From the changes of each plane of `before`.
+    /// From the changes of each plane of `before`, and those of lights.
     pub(crate) fn new(
         [visibility, first, second]: [Vec<ValueChange>; PLANES],
+        lights: Vec<LightChange>,
         before: &PointStore,
     ) -> Changes {
-        let Some(planes) = before.bent() else { return Changes { visibility, bent: Vec::new() } };
+        let Some(planes) = before.bent() else { return Changes { visibility, bent: Vec::new(), lights } };
         let mut bent = Vec::with_capacity(first.len().max(second.len()));
         let (mut first, mut second) = (first.into_iter().peekable(), second.into_iter().peekable());
         loop {
@@ -43,7 +74,7 @@ impl Changes {
             }
             bent.push(BentChange { point, old, new });
         }
-        Changes { visibility, bent }
+        Changes { visibility, bent, lights }
     }
 }
 
@@ -69,6 +100,6 @@ mod tests {
             BentChange { point, old, new: BentNormal(new) }
         };
         let expected = [bent(0, [99, 20]), bent(2, [99, 99]), bent(3, [13, 99])];
-        assert_eq!(Changes::new(planes, &store).bent, expected);
+        assert_eq!(Changes::new(planes, Vec::new(), &store).bent, expected);
     }
 }

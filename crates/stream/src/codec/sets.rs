@@ -4,11 +4,13 @@
 //! delta on top of it.
 
 use dapple_store::charts::Cuts;
+use dapple_store::light_visibility::MAX_VALUES;
 use dapple_store::points::{MAX_POINTS, PointStore};
 
 use super::decode::{DecodedLayout, DeltaParts, decode_layout, decode_values};
 #[cfg(feature = "publish")]
 use super::encode::{append_values, encode_layout};
+use super::planes::Extras;
 use super::values::Near;
 #[cfg(feature = "publish")]
 use super::varint::write_varint;
@@ -30,7 +32,7 @@ pub(crate) fn sets_head(epochs_back: u64, gone: &[u32], added: &PointStore, cuts
         out.push(0);
         return out;
     }
-    let encoded = encode_layout(layout, cuts, added.bent().is_some());
+    let encoded = encode_layout(layout, cuts, Extras::of(added));
     write_varint(&mut out, encoded.bytes.len() as u64);
     out.extend(&encoded.bytes);
     let near = Near::new(layout, encoded.local_bits);
@@ -89,20 +91,24 @@ pub(crate) fn decode_sets_change<'a>(
         // What stays counts as well.
         let stays = |instance: &u32| gone.binary_search(instance).is_err();
         let sets = held.sets().iter().filter(|set| stays(&set.instance));
-        let points = sets.clone().map(|set| set.len() as u64).sum();
+        let points: u64 = sets.clone().map(|set| set.len() as u64).sum();
         let cut_sets = cuts.sets().iter().filter(|set| stays(&set.instance));
         let left = Limits {
             max_points: less(limits.max_points.min(MAX_POINTS), points),
             max_sets: less(limits.max_sets, sets.count() as u64),
             max_cuts: less(limits.max_cuts, cut_sets.map(|set| set.cuts.len() as u64).sum()),
+            max_light_values: less(
+                limits.max_light_values.min(MAX_VALUES as u32),
+                points.saturating_mul(u64::from(store.light_count())),
+            ),
             ..*limits
         };
         let decoded = decode_layout(layout_bytes, &left)?;
         check_fit(&decoded, (store, local_bits), &gone)?;
-        let DecodedLayout { layout, cuts, has_bent, .. } = decoded;
+        let DecodedLayout { layout, cuts, extras, .. } = decoded;
         let near = Near::new(&layout, local_bits);
         let value_bytes = size(reader.varint("values")?);
-        let added = decode_values(reader.take(value_bytes, "values")?, layout.into(), &near, has_bent)?;
+        let added = decode_values(reader.take(value_bytes, "values")?, layout.into(), &near, extras)?;
         (added, cuts)
     };
     let changes =
@@ -125,8 +131,11 @@ fn check_fit(
     if !added.has_lengths_of(held) || decoded.local_bits != local_bits {
         return bad("have other lengths than the layout");
     }
-    if decoded.has_bent != store.bent().is_some() {
+    if decoded.extras.has_bent != store.bent().is_some() {
         return bad("have bent normals where others have none, or none where others have");
+    }
+    if decoded.extras.lights != store.light_count() {
+        return bad("have values of more or fewer lights than others have");
     }
     if added.sets().is_empty() {
         return bad("are none");

@@ -1,223 +1,234 @@
-//! Visibility of lights at points ⇄ bodies: a snapshot, and deltas that build on it. Pure, and blind to frames and order: these are
-//! the session's.
+//! Changes of lights' visibility ⇄ choices: which lights, which stretches of points, which points, and by how much.
 //!
-//! - takes: [`LightVisibility`] as it is traced, and by how much each value may be off before one sees it
-//! - returns: bytes; and of any bytes the values that the sender counts on, or what is wrong with them
+//! Written once for both ends, as a part of a delta ([`crate::codec`]); a snapshot has them as it has other values. `README.md` has the bits.
 //!
-//! `README.md` has the bits.
+//! What changes is mostly where the edge of a shadow passes: points go all the way from blocked to open or
+//! back, and their neighbours did so just before them in the order, or have what they get already.
 
-#[cfg(test)]
-mod tests;
-mod walk;
+use std::ops::Range;
 
-use std::sync::Arc;
-
-#[cfg(feature = "publish")]
-use dapple_store::light_visibility::LightVisibilityError;
-use dapple_store::light_visibility::{LightChange, LightVisibility, MAX_LIGHTS, OPEN};
+use dapple_store::light_visibility::{LightChange, OPEN};
 use dapple_store::points::PointLayout;
 
-use crate::DecodeError;
-use crate::codec::entropy::Reader as Choices;
-#[cfg(feature = "publish")]
-use crate::codec::entropy::Writer;
-#[cfg(feature = "publish")]
-use crate::codec::local_bits;
-use crate::codec::varint::Reader;
-#[cfg(feature = "publish")]
-use crate::codec::varint::write_varint;
-use crate::codec::{MAX_LOCAL_BITS, Near, code_values};
+use crate::codec::entropy::{Chance, Coder, Number};
+use crate::codec::{BLOCK, Back, Near, SHARES};
 
-/// What a receiver is willing to take. It holds a byte a value, and 8 more for each that changes while a body is read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LightLimits {
-    /// Most lights. Default [`MAX_LIGHTS`].
-    pub max_lights: u32,
-    /// Most values, lights × points. Default 4 million; at most
-    /// [`MAX_VALUES`](dapple_store::light_visibility::MAX_VALUES) has an effect.
-    pub max_values: u32,
-}
+/// Points of a stretch on each level; a stretch is one of the next level's parts.
+const LEVELS: [usize; 3] = [1024, BLOCK, LEAF];
 
-impl Default for LightLimits {
-    fn default() -> LightLimits {
-        LightLimits { max_lights: MAX_LIGHTS, max_values: 1 << 22 }
+/// Points of the smallest stretch.
+const LEAF: usize = 8;
+
+/// Codes what of `held` (light by light) is another in `wanted`, which a reader has not. Gives the changes in order, or nothing if the bytes of a
+/// reader ended too early.
+pub(crate) fn code_light_changes<C: Coder>(
+    coder: &mut C,
+    (layout, near): (&PointLayout, &mut Near),
+    held: &[u8],
+    wanted: Option<&[u8]>,
+) -> Option<Vec<LightChange>> {
+    let points = layout.len();
+    if points == 0 {
+        return Some(Vec::new());
     }
-}
-
-/// The sending end: knows what the receivers hold.
-#[cfg(feature = "publish")]
-#[derive(Clone, Debug)]
-pub struct LightPublisher {
-    layout: Arc<PointLayout>,
-    local_bits: u32,
-    near: Near,
-    sent: LightVisibility,
-}
-
-#[cfg(feature = "publish")]
-impl LightPublisher {
-    /// Begins with these values of the points of `layout`.
-    ///
-    /// # Errors
-    /// They are of another number of points.
-    pub fn new(
-        layout: Arc<PointLayout>,
-        values: LightVisibility,
-    ) -> Result<LightPublisher, LightVisibilityError> {
-        check_same(&values, layout.len(), values.lights())?;
-        let local_bits = local_bits(&layout);
-        Ok(LightPublisher { near: Near::new(&layout, local_bits), layout, local_bits, sent: values })
-    }
-
-    /// What receivers hold that have got everything.
-    pub fn sent(&self) -> &LightVisibility {
-        &self.sent
-    }
-
-    /// A body with which a receiver joins here.
-    pub fn snapshot(&self) -> Vec<u8> {
-        let mut out = Vec::new();
-        write_varint(&mut out, u64::from(self.sent.lights()));
-        out.push(self.local_bits as u8);
-        if self.sent.values().is_empty() {
-            return out;
+    let (mut chances, mut changes) = (Chances::new(), Vec::new());
+    let mut moved = vec![0i8; points];
+    let mut lights = 0;
+    for (light, held) in held.chunks_exact(points).enumerate() {
+        let first = light * points;
+        let wanted = wanted.map(|wanted| &wanted[first..first + points]);
+        let is_coded = coder.bit(&mut chances.lights[lights & 3], wanted.is_some_and(|w| w != held));
+        lights = lights << 1 | usize::from(is_coded);
+        if coder.is_exhausted() {
+            return None;
         }
-        let mut coder = Writer::new(out);
-        for light in 0..self.sent.lights() {
-            let values = self.sent.of_light(light);
-            // A writer gets back what it wrote.
-            let written = code_values(&mut coder, &self.layout, &self.near, |point| values[point]);
-            debug_assert_eq!(written.as_deref(), Ok(values));
+        if is_coded {
+            moved.fill(0);
+            let mut walk = Walk {
+                coder,
+                layout,
+                near,
+                held,
+                wanted,
+                first,
+                chances: &mut chances,
+                flags: [0; LEVELS.len()],
+                moved: &mut moved,
+                back: [[0; 4]; BLOCK],
+                changes: &mut changes,
+            };
+            walk.descend(0, 0..points)?;
         }
-        coder.finish()
     }
+    Some(changes)
+}
 
-    /// A body that brings receivers from what they hold to `values`, but for what is off by no more than its tolerance (steps; none where the list
-    /// ends): that waits. Empty if all can wait.
-    ///
-    /// # Errors
-    /// The values are of other points or lights; nothing changes then.
-    pub fn delta(
-        &mut self,
-        values: &LightVisibility,
-        tolerances: &[u8],
-    ) -> Result<Vec<u8>, LightVisibilityError> {
-        check_same(values, self.sent.points(), self.sent.lights())?;
-        let mut wanted = self.sent.values().to_vec();
-        for (index, (held, new)) in wanted.iter_mut().zip(values.values()).enumerate() {
-            if held.abs_diff(*new) > tolerances.get(index).copied().unwrap_or(0) {
-                *held = *new;
+/// One light.
+struct Walk<'a, C> {
+    coder: &'a mut C,
+    layout: &'a PointLayout,
+    near: &'a mut Near,
+    held: &'a [u8],
+    wanted: Option<&'a [u8]>,
+    /// Index of the light's first value.
+    first: usize,
+    chances: &'a mut Chances,
+    /// Of each level: which of the last stretches have changes, the last one lowest.
+    flags: [usize; LEVELS.len()],
+    /// By how much each point changed.
+    moved: &'a mut [i8],
+    /// Neighbours of the points of the block that is coded.
+    back: Back,
+    changes: &'a mut Vec<LightChange>,
+}
+
+impl<C: Coder> Walk<'_, C> {
+    /// Codes which stretches of this level have changes, and these.
+    fn descend(&mut self, level: usize, points: Range<usize>) -> Option<()> {
+        // Of a stretch that has changes, one part has some.
+        let mut is_silent = true;
+        for start in points.clone().step_by(LEVELS[level]) {
+            let part = start..(start + LEVELS[level]).min(points.end);
+            let is_implied = is_silent && part.end == points.end;
+            let is_coded = is_implied || {
+                let wants = self.wanted.is_some_and(|w| w[part.clone()] != self.held[part.clone()]);
+                let context = self.flag_context(level, start);
+                self.coder.bit(&mut self.chances.flags[level][context], wants)
+            };
+            self.flags[level] = self.flags[level] << 1 | usize::from(is_coded);
+            if !is_coded {
+                continue;
+            }
+            is_silent = false;
+            if LEVELS[level] == BLOCK {
+                self.back = *self.near.of_block(self.layout, start / BLOCK);
+            }
+            if level + 1 < LEVELS.len() {
+                self.descend(level + 1, part)?;
+            } else {
+                part.for_each(|point| self.code_point(point));
+            }
+            if self.coder.is_exhausted() {
+                return None;
             }
         }
-        if wanted == self.sent.values() {
-            return Ok(Vec::new());
-        }
-        let mut coder = Writer::new(Vec::new());
-        let held = self.sent.values();
-        let changes = walk::code_changes(&mut coder, (&self.layout, &mut self.near), held, Some(&wanted));
-        self.sent.apply(&changes.unwrap_or_default())?;
-        debug_assert_eq!(self.sent.values(), wanted);
-        let mut body = coder.finish();
-        if body.is_empty() {
-            // No bytes say that nothing changed; a reader goes on with zeros anyway.
-            body.push(0);
-        }
-        Ok(body)
+        Some(())
     }
-}
 
-#[cfg(feature = "publish")]
-fn check_same(values: &LightVisibility, points: usize, lights: u32) -> Result<(), LightVisibilityError> {
-    let is_same = values.points() == points && values.lights() == lights;
-    let values = values.values().len();
-    if is_same { Ok(()) } else { Err(LightVisibilityError::WrongCount { values, points, lights }) }
-}
+    fn flag_context(&self, level: usize, start: usize) -> usize {
+        let before = self.flags[level] & 3;
+        if LEVELS[level] != LEAF {
+            return before;
+        }
+        // How many neighbours of some of its points changed.
+        let points = (start..(start + LEAF).min(self.held.len())).step_by(3);
+        let changed = |point: usize| {
+            let back = &self.back[point % BLOCK];
+            back.iter().filter(|back| self.moved[point - usize::from(**back)] != 0).count()
+        };
+        let changed: usize = points.map(changed).sum();
+        before * 4 + rank(changed as i32, &[1, 3, 7])
+    }
 
-/// The receiving end.
-#[derive(Clone, Debug)]
-pub struct LightSubscriber {
-    layout: Arc<PointLayout>,
-    near: Near,
-    held: LightVisibility,
-}
-
-impl LightSubscriber {
-    /// Joins with a snapshot of values at the points of `layout`.
-    ///
-    /// # Errors
-    /// The bytes are no snapshot of that many points, or say more than the limits allow.
-    pub fn join(
-        layout: Arc<PointLayout>,
-        body: &[u8],
-        limits: &LightLimits,
-    ) -> Result<LightSubscriber, DecodeError> {
-        const PART: &str = "visibility of lights";
-        let bad = |reason| DecodeError::Malformed { part: PART, reason };
-        let mut reader = Reader::new(body);
-        let lights = reader.varint("number of lights")?;
-        let too_large =
-            |what, value, limit: u32| DecodeError::TooLarge { what, value, limit: u64::from(limit) };
-        if lights > u64::from(limits.max_lights) {
-            return Err(too_large("lights", lights, limits.max_lights));
+    fn code_point(&mut self, point: usize) {
+        let old = i32::from(self.held[point]);
+        let wanted = self.wanted.map_or(old, |wanted| i32::from(wanted[point]));
+        let around = self.around(point, old);
+        let chances = &mut *self.chances;
+        let end = edge(old);
+        let some =
+            &mut chances.some[rank(around.changed, &[1, 3, 6])][rank(around.gap.abs(), &[4, 32, 96])][end];
+        if !self.coder.bit(some, wanted != old) {
+            return;
         }
-        let count = lights.saturating_mul(layout.len() as u64);
-        if count > u64::from(limits.max_values) {
-            return Err(too_large("values of lights", count, limits.max_values));
-        }
-        // Also where there are no points.
-        let lights = u32::try_from(lights).unwrap_or(u32::MAX);
-        LightVisibility::open(&layout, lights).map_err(|_| bad("is of more lights or points than fit"))?;
-        let local_bits = u32::from(reader.byte(PART)?);
-        if local_bits > MAX_LOCAL_BITS {
-            return Err(bad("has cells that no layout has"));
-        }
-        let near = Near::new(&layout, local_bits);
-        let rest = reader.take(reader.len(), PART)?;
-        let mut coder = Choices::new(rest);
-        let mut values = Vec::with_capacity(count as usize);
-        for _ in 0..lights {
-            let plane = code_values(&mut coder, &layout, &near, |_| 0).map_err(bad)?;
-            if plane.iter().any(|value| *value > OPEN) {
-                return Err(bad("exceeds that of a light of which all is seen"));
+        let rises = match end {
+            1 => true,
+            2 => false,
+            _ => {
+                let side = |number: i32| (number.signum() + 1) as usize;
+                self.coder.bit(&mut chances.rises[side(around.drift)][side(around.gap)], wanted > old)
             }
-            values.extend(plane);
-        }
-        if !is_done(&coder, rest, layout.is_empty() || lights == 0) {
-            return Err(bad("has more or fewer bytes than it needs"));
-        }
-        let held =
-            LightVisibility::new(&layout, lights, values).map_err(|_| bad("does not fit the layout"))?;
-        Ok(LightSubscriber { layout, near, held })
+        };
+        let room = if rises { i32::from(OPEN) - old } else { old };
+        let size = (wanted - old).abs();
+        let size = if room == 1 {
+            1
+        } else {
+            // Whether the neighbours are there, or on the way there.
+            let toward = if rises { around.gap } else { -around.gap };
+            let near = rank(toward, &[1, 4 * room, 7 * room]);
+            let kind = usize::from(end != 0);
+            if self.coder.bit(&mut chances.whole[near][kind], size == room) {
+                room
+            } else {
+                let of = &mut chances.size[near.min(2)][kind];
+                let most = (room - 2).max(0) as u32;
+                1 + of.code(self.coder, (size - 1).clamp(0, most as i32) as u32, most) as i32
+            }
+        };
+        let change = if rises { size } else { -size };
+        self.moved[point] = change as i8;
+        let index = (self.first + point) as u32;
+        self.changes.push(LightChange { index, old: old as u8, new: (old + change) as u8 });
     }
 
-    /// What is held.
-    pub fn visibility(&self) -> &LightVisibility {
-        &self.held
-    }
-
-    /// Takes a delta, and tells what changed, in order.
-    ///
-    /// # Errors
-    /// The bytes are no delta of these values; nothing changes then.
-    pub fn apply(&mut self, body: &[u8]) -> Result<Vec<LightChange>, DecodeError> {
-        const PART: &str = "changes of lights' visibility";
-        let bad = |reason| DecodeError::Malformed { part: PART, reason };
-        if body.is_empty() {
-            return Ok(Vec::new());
+    fn around(&self, point: usize, old: i32) -> Around {
+        let mut around = Around::default();
+        for (share, back) in SHARES.iter().zip(self.back[point % BLOCK]) {
+            if back == 0 {
+                continue;
+            }
+            let other = point - usize::from(back);
+            let moved = i32::from(self.moved[other]);
+            around.changed += if moved != 0 { *share } else { 0 };
+            around.drift += share * moved;
+            around.gap += share * (i32::from(self.held[other]) + moved - old);
         }
-        let mut coder = Choices::new(body);
-        let held = self.held.values();
-        let changes = walk::code_changes(&mut coder, (&self.layout, &mut self.near), held, None);
-        let changes = changes.ok_or_else(|| bad("end early"))?;
-        if !is_done(&coder, body, held.is_empty()) {
-            return Err(bad("have more or fewer bytes than they need"));
-        }
-        self.held.apply(&changes).map_err(|_| bad("do not fit"))?;
-        Ok(changes)
+        around
     }
 }
 
-/// Whether a coder has read just these bytes. Where there is nothing to read there may be none.
-fn is_done(coder: &Choices<'_>, bytes: &[u8], is_nothing: bool) -> bool {
-    if is_nothing { bytes.is_empty() } else { coder.is_complete() }
+/// What neighbours say, each by its share.
+#[derive(Default)]
+struct Around {
+    /// Share of them that changed, 8ths.
+    changed: i32,
+    /// How much, 8ths of a step.
+    drift: i32,
+    /// How far they are above the point as it was, 8ths of a step.
+    gap: i32,
+}
+
+/// How many of the limits a number reaches.
+fn rank(number: i32, limits: &[i32; 3]) -> usize {
+    limits.iter().filter(|limit| number >= **limit).count()
+}
+
+/// 1 for blocked, 2 for open, 0 between.
+fn edge(value: i32) -> usize {
+    if value == 0 { 1 } else { 2 * usize::from(value == i32::from(OPEN)) }
+}
+
+/// What is learned while changes are coded.
+struct Chances {
+    lights: [Chance; 4],
+    flags: [[Chance; 16]; LEVELS.len()],
+    /// By the share of neighbours that changed, how far they are, and at which end the point is.
+    some: [[[Chance; 3]; 4]; 4],
+    rises: [[Chance; 3]; 3],
+    whole: [[Chance; 2]; 4],
+    size: [[Number; 2]; 3],
+}
+
+impl Chances {
+    fn new() -> Chances {
+        Chances {
+            lights: [Chance::EVEN; 4],
+            flags: [[Chance::EVEN; 16]; LEVELS.len()],
+            some: [[[Chance::EVEN; 3]; 4]; 4],
+            rises: [[Chance::EVEN; 3]; 3],
+            whole: [[Chance::EVEN; 2]; 4],
+            size: [[Number::default(); 2]; 3],
+        }
+    }
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use dapple_store::charts::Cuts;
+use dapple_store::light_visibility::LightChange;
 use dapple_store::points::{BentChange, Change, LayoutError, PackedNormal, PointLayout, PointStore};
 
 use super::{Applied, ReceiveError, Subscriber};
@@ -20,6 +21,7 @@ pub struct Parts {
     whole: PointStore,
     cuts: Cuts,
     bent_changes: Vec<BentChange>,
+    light_changes: Vec<LightChange>,
 }
 
 /// One publisher's light.
@@ -41,6 +43,7 @@ impl Parts {
             whole: PointStore::default(),
             cuts: Cuts::default(),
             bent_changes: Vec::new(),
+            light_changes: Vec::new(),
         }
     }
 
@@ -50,6 +53,7 @@ impl Parts {
     /// The frame does not fit what is held, which is as it was. After [`ReceiveError::Misfit`] the part's next frame must be a snapshot.
     pub fn receive(&mut self, part: u32, frame: &[u8]) -> Result<Applied, ReceiveError> {
         self.bent_changes.clear();
+        self.light_changes.clear();
         let new = || Part {
             subscriber: Subscriber::new(self.expected_scene_hash, self.limits),
             instances: Vec::new(),
@@ -108,6 +112,11 @@ impl Parts {
         &self.bent_changes
     }
 
+    /// As [`Subscriber::light_changes`], of the whole.
+    pub fn light_changes(&self) -> &[LightChange] {
+        &self.light_changes
+    }
+
     /// What has come of one part.
     pub fn part(&self, part: u32) -> Option<&Subscriber> {
         self.parts.get(&part).map(|part| &part.subscriber)
@@ -130,6 +139,7 @@ impl Parts {
         };
         let stores = || others().filter_map(Subscriber::store);
         let cuts = others().filter_map(Subscriber::cuts).map(|cuts| cuts.site_count() as u64).sum();
+        let lights = stores().filter_map(PointStore::lights).map(|lights| lights.values().len() as u64).sum();
         Limits {
             max_points: less(self.limits.max_points, stores().map(|store| store.layout().len() as u64).sum()),
             max_sets: less(
@@ -137,6 +147,7 @@ impl Parts {
                 stores().map(|store| store.layout().sets().len() as u64).sum(),
             ),
             max_cuts: less(self.limits.max_cuts, cuts),
+            max_light_values: less(self.limits.max_light_values, lights),
             ..self.limits
         }
     }
@@ -154,10 +165,23 @@ impl Parts {
         let bent = part.bent_changes().iter();
         self.bent_changes =
             bent.filter_map(|change| Some(BentChange { point: place(change.point)?, ..*change })).collect();
+        let points = layout.len() as u32;
+        let wholes = self.whole.layout().len() as u32;
+        let mut lights = Vec::with_capacity(part.light_changes().len());
+        // Changes are light by light, and each light begins with the first point again.
+        for of_light in part.light_changes().chunk_by(|a, b| a.index / points == b.index / points) {
+            let mut place = places(layout, self.whole.layout());
+            lights.extend(of_light.iter().filter_map(|change| {
+                let (light, point) = (change.index / points, place(change.index % points)?);
+                Some(LightChange { index: light * wholes + point, ..*change })
+            }));
+        }
+        self.light_changes = lights;
         let news: Vec<Change> =
             changes.iter().map(|change| Change { point: change.point, visibility: change.new }).collect();
         self.whole.apply(&news).expect("they are points of the whole");
         self.whole.apply_bent(&self.bent_changes).expect("the whole has what its parts have");
+        self.whole.apply_lights(&self.light_changes).expect("the whole has the lights of its parts");
         changes
     }
 
@@ -181,8 +205,12 @@ impl Parts {
     fn try_replace(&mut self, number: u32, removed: &[u32], added: &[u32]) -> Result<(), LayoutError> {
         let part = &self.parts[&number];
         let of_part = part.subscriber.store().expect("it has just come");
+        let (held, found) = (self.whole.light_count(), of_part.light_count());
         let whole = if self.whole.layout().sets().is_empty() {
             of_part.clone()
+        } else if held != found {
+            // As many lights as one part has, times as many points as another has, may be more than both together.
+            return Err(LayoutError::OtherLights { held, found });
         } else {
             let coming = Arc::new(of_part.layout().only(added));
             self.whole.with_sets(removed, &PointStore::default().carried(coming, of_part))?

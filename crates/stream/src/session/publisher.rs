@@ -5,11 +5,12 @@ use std::sync::{Arc, OnceLock};
 use dapple_store::charts::Cuts;
 use dapple_store::points::{PointLayout, PointStore, SetsChange};
 
+use super::lights::{light_changes, lights_within};
 use super::precision::Precision;
 use super::sets::{apply, difference};
 use super::within::{ENVELOPE_BYTES, Pressure, Search, Spending};
 use crate::codec::{
-    Changes, EncodedLayout, Fit, FrameKind, Goal, Near, PLANES, Scratch, Tolerances, append_changes,
+    Changes, EncodedLayout, Extras, Fit, FrameKind, Goal, Near, PLANES, Scratch, Tolerances, append_changes,
     encode_layout, local_bits, planes, seal, sets_head, snapshot_payload, varint::write_varint,
 };
 
@@ -130,7 +131,7 @@ impl Publisher {
         let (frame, changed) = match &mut self.state {
             Some(state)
                 if same_layout(state.store.layout(), store.layout())
-                    && state.store.bent().is_some() == store.bent().is_some() =>
+                    && Extras::of(&state.store) == Extras::of(store) =>
             {
                 let full = self.config.deltas_per_group;
                 match state.encode_within(epoch, store, self.config.precisions(), spending) {
@@ -155,15 +156,16 @@ impl Publisher {
                     let full = self.config.deltas_per_group;
                     let ends = full > 0 && state.deltas >= full;
                     // Within a limit, what stays waits for the next frame.
-                    let precisions = spending.most_bytes.is_none().then(|| self.config.precisions());
-                    let (frame, changed) = state.change_sets(epoch, (store, cuts), &change, precisions);
+                    let exact = spending.most_bytes.is_none();
+                    let exact = exact.then(|| (self.config.precisions(), spending.light_tolerances));
+                    let (frame, changed) = state.change_sets(epoch, (store, cuts), &change, exact);
                     let frame = if ends { state.start_group(epoch, &self.scene_hash) } else { frame };
                     (self.next_epoch, self.changed) = (epoch + 1, changed as u32);
                     return Some(frame);
                 }
                 let group =
                     old.as_ref().map_or(self.config.first_group.min(u64::MAX >> 1), |state| state.group + 1);
-                let encoded = encode_layout(store.layout(), &cuts, store.bent().is_some());
+                let encoded = encode_layout(store.layout(), &cuts, Extras::of(store));
                 let state = State {
                     near: Near::new(store.layout(), encoded.local_bits),
                     store: store.clone(),
@@ -240,8 +242,8 @@ impl State {
     }
 
     fn encoded(&self) -> &EncodedLayout {
-        let has_bent = self.store.bent().is_some();
-        self.encoded.get_or_init(|| encode_layout(self.store.layout(), &self.cuts, has_bent))
+        let extras = Extras::of(&self.store);
+        self.encoded.get_or_init(|| encode_layout(self.store.layout(), &self.cuts, extras))
     }
 
     fn payload(&self, scene_hash: &[u8; 32]) -> Vec<u8> {
@@ -269,15 +271,18 @@ impl State {
         let precision = precisions[0];
         let Some(most_bytes) = spending.most_bytes else {
             self.pressure = Pressure::default();
-            return self.encode(epoch, store, exact);
+            let lights = light_changes(&self.store, store, spending.light_tolerances, 1);
+            return self.encode(epoch, store, exact, lights.as_deref());
         };
         let most = most_bytes.saturating_sub(ENVELOPE_BYTES);
+        let lights = lights_within(&self.store, store, &mut self.near, spending.light_tolerances, most / 2);
+        let lights = lights.as_deref();
         let mut best: Option<Delta> = None;
         let mut search = Search::new(self.pressure, precision, spending.coarseness);
         loop {
             let pressure = search.pressure();
             let found = if pressure.is_none() {
-                self.encode(epoch, store, exact)
+                self.encode(epoch, store, exact, lights)
             } else {
                 let points = store.layout().len();
                 let planes = precisions.iter().take(planes(store).count());
@@ -286,7 +291,7 @@ impl State {
                     .collect();
                 let of = |k: usize| by_plane.get(k).map(|(each, step)| (Tolerances::Each(each), *step));
                 let goals = std::array::from_fn(|k| of(k).unwrap_or(exact[k]));
-                self.encode(epoch, store, goals)
+                self.encode(epoch, store, goals, lights)
             };
             let bytes = found.as_ref().map_or(0, |delta| delta.payload.len());
             match found {
@@ -311,19 +316,24 @@ impl State {
         best
     }
 
-    /// The delta to values that are no farther from these than they may be; `None` where there is nothing to say.
+    /// The delta to values that are no farther from these than they may be, and to these of lights; `None` where there is nothing to say.
     fn encode(
         &mut self,
         epoch: u64,
         store: &PointStore,
         goals: [(Tolerances<'_>, u8); PLANES],
+        lights: Option<&[u8]>,
     ) -> Option<Delta> {
-        let goals = goals_of(&self.store, store, goals)?;
+        let goals = goals_of(&self.store, store, goals);
+        if goals.is_none() && lights.is_none() {
+            return None;
+        }
+        let goals = goals.unwrap_or_default();
         let mut out = Vec::new();
         write_varint(&mut out, epoch - self.epoch);
         let mut fits = self.fits;
         let (payload, changes) =
-            append_changes(out, &mut self.near, &self.store, goals, &mut fits, &mut self.scratch);
+            append_changes(out, &mut self.near, &self.store, goals, lights, &mut fits, &mut self.scratch);
         Some(Delta { payload, changes, fits, pressure: Pressure::default() })
     }
 
@@ -351,7 +361,7 @@ impl State {
         epoch: u64,
         (store, cuts): (&PointStore, Cuts),
         change: &SetsChange,
-        precisions: Option<[Precision; PLANES]>,
+        exact: Option<([Precision; PLANES], &[(u32, u8)])>,
     ) -> (Frame, usize) {
         let added = PointStore::default().carried(store.layout().only(&change.added).into(), store);
         let cuts = cuts.only(&change.added);
@@ -360,13 +370,16 @@ impl State {
         self.store = self.store.carried(store.layout().clone(), &added);
         self.cuts = self.cuts.with_sets(&change.removed, &cuts);
         self.near = Near::new(store.layout(), local_bits(store.layout()));
-        let goals = precisions.and_then(|precisions| {
+        let goals = exact.and_then(|(precisions, _)| {
             let exact = precisions.map(|Precision { tolerance, step }| (Tolerances::Even(tolerance), step));
             goals_of(&self.store, store, exact)
         });
-        if let Some(goals) = goals {
+        let lights = exact.and_then(|(_, tolerances)| light_changes(&self.store, store, tolerances, 1));
+        if goals.is_some() || lights.is_some() {
+            let goals = goals.unwrap_or_default();
             let State { near, store: held, fits, scratch, .. } = self;
-            let (bytes, changes) = append_changes(payload, near, held, goals, fits, scratch);
+            let (bytes, changes) =
+                append_changes(payload, near, held, goals, lights.as_deref(), fits, scratch);
             apply(held, &changes).expect("changes are of points of the store");
             (payload, changed) = (bytes, changed + changes.visibility.len());
         }

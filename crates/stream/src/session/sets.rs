@@ -1,14 +1,15 @@
 //! What both ends of a session ask of layouts whose sets come and go.
 
 use dapple_store::charts::{Cuts, SetCuts};
+use dapple_store::light_visibility::LightChange;
 use dapple_store::points::{BentChange, Change, PointStore, SetsChange, StoreError};
 
-use crate::codec::{Changes, ValueChange};
+use crate::codec::{Changes, Extras, ValueChange};
 
-/// Which sets make the difference between what was and what is, if any set with points stays, the lengths are the same, and both have bent
-/// normals or neither. A set whose cuts differ goes and comes.
+/// Which sets make the difference between what was and what is, if any set with points stays, the lengths are the same, and both have the same
+/// beside visibility. A set whose cuts differ goes and comes.
 pub(super) fn difference(old: (&PointStore, &Cuts), new: (&PointStore, &Cuts)) -> Option<SetsChange> {
-    if old.0.bent().is_some() != new.0.bent().is_some() {
+    if Extras::of(old.0) != Extras::of(new.0) {
         return None;
     }
     let mut change = old.0.layout().difference(new.0.layout())?;
@@ -53,6 +54,29 @@ pub(super) fn changes_between(old: &PointStore, new: &PointStore, added: &[u32])
             (old != new).then_some(BentChange { point, old, new })
         }));
     }
+    changes.lights = light_changes(old, new, added);
+    changes
+}
+
+/// The same of lights' visibility, where both have as many lights.
+fn light_changes(old: &PointStore, new: &PointStore, added: &[u32]) -> Vec<LightChange> {
+    let mut changes = Vec::new();
+    let (Some(before), Some(now)) = (old.lights(), new.lights()) else { return changes };
+    if before.lights() != now.lights() {
+        return changes;
+    }
+    for light in 0..now.lights() {
+        let first = light as usize * now.points();
+        for set in new.layout().sets() {
+            let was = old.layout().set_of_instance(set.instance);
+            let Some(was) = was.filter(|_| added.binary_search(&set.instance).is_err()) else { continue };
+            let values = &before.of_light(light)[was.first as usize..][..was.len()];
+            let new = &now.of_light(light)[set.first as usize..][..set.len()];
+            let indices = first as u32 + set.first..;
+            let pairs = indices.zip(values.iter().zip(new)).filter(|(_, (old, new))| old != new);
+            changes.extend(pairs.map(|(index, (&old, &new))| LightChange { index, old, new }));
+        }
+    }
     changes
 }
 
@@ -61,5 +85,6 @@ pub(super) fn apply(store: &mut PointStore, changes: &Changes) -> Result<(), Sto
     let visibility = |c: &ValueChange| Change { point: c.point, visibility: c.new };
     let news: Vec<Change> = changes.visibility.iter().map(visibility).collect();
     store.apply(&news)?;
-    store.apply_bent(&changes.bent)
+    store.apply_bent(&changes.bent)?;
+    store.apply_lights(&changes.lights)
 }

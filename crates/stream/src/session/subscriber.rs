@@ -1,11 +1,12 @@
 //! Frames → the publisher's store.
 
 use dapple_store::charts::Cuts;
+use dapple_store::light_visibility::{LightChange, LightVisibility};
 use dapple_store::points::{BentChange, LayoutError, PointStore, StoreError};
 
 use crate::codec::{
-    Changes, DecodeError, DecodedLayout, DecodedSets, DeltaParts, FrameHeader, FrameKind, Limits, Near,
-    Scratch, ValueChange, decode_changes, decode_layout, decode_sets_change, decode_values, open,
+    Changes, DecodeError, DecodedLayout, DecodedSets, DeltaParts, Extras, FrameHeader, FrameKind, Limits,
+    Near, Scratch, ValueChange, decode_changes, decode_layout, decode_sets_change, decode_values, open,
     parse_delta, parse_snapshot,
 };
 use crate::session::sets::{apply, changes_between, difference};
@@ -116,6 +117,7 @@ struct State {
     store: PointStore,
     /// Of the last frame.
     bent_changes: Vec<BentChange>,
+    light_changes: Vec<LightChange>,
     near: Near,
     scratch: Scratch,
 }
@@ -131,6 +133,7 @@ impl Subscriber {
     pub fn receive(&mut self, bytes: &[u8]) -> Result<Applied, ReceiveError> {
         if let Some(state) = &mut self.state {
             state.bent_changes.clear();
+            state.light_changes.clear();
         }
         let (header, payload) = open(bytes, &self.limits)?;
         if let Some(reason) = self.not_needed(&header) {
@@ -169,6 +172,17 @@ impl Subscriber {
     /// where it changed none, as without bent normals, and where it brought another layout.
     pub fn bent_changes(&self) -> &[BentChange] {
         self.state.as_ref().map_or(&[], |state| &state.bent_changes)
+    }
+
+    /// How much of each light the points see, if the stream says so: [`PointStore::lights`] of what is held.
+    pub fn lights(&self) -> Option<&LightVisibility> {
+        self.store().and_then(PointStore::lights)
+    }
+
+    /// Which values of lights the last frame changed at points that stayed, in order of index, which is that in the store as it is now. Empty where it
+    /// changed none, and where it brought another layout, or another number of lights.
+    pub fn light_changes(&self) -> &[LightChange] {
+        self.state.as_ref().map_or(&[], |state| &state.light_changes)
     }
 
     /// Which points do not count at which texels, with the layout that is held. Empty where the publisher sends none.
@@ -223,24 +237,25 @@ impl Subscriber {
             && state.scene_hash == parts.scene_hash
             && state.layout_bytes == parts.layout
         {
-            let has_bent = state.store.bent().is_some();
-            let store = decode_values(parts.values, state.store.layout().clone(), &state.near, has_bent)?;
+            let extras = Extras::of(&state.store);
+            let store = decode_values(parts.values, state.store.layout().clone(), &state.near, extras)?;
             let changes = changes_between(&state.store, &store, &[]);
-            (state.store, state.bent_changes) = (store, changes.bent);
+            (state.store, state.bent_changes, state.light_changes) = (store, changes.bent, changes.lights);
             (state.group, state.epoch) = (header.group, header.epoch);
             return Ok(Applied::Changes(changes.visibility));
         }
         let decoded = decode_layout(parts.layout, &self.limits)?;
-        let DecodedLayout { layout, cuts, local_bits, has_bent } = decoded;
+        let DecodedLayout { layout, cuts, local_bits, extras } = decoded;
         let near = Near::new(&layout, local_bits);
-        let mut store = decode_values(parts.values, layout.into(), &near, has_bent)?;
-        let (mut applied, mut bent_changes) = (Applied::NewLayout, Vec::new());
+        let mut store = decode_values(parts.values, layout.into(), &near, extras)?;
+        let (mut applied, mut bent_changes, mut light_changes) = (Applied::NewLayout, Vec::new(), Vec::new());
         if let Some(state) = self.state.as_ref()
             && state.scene_hash == parts.scene_hash
             && let Some(change) = difference((&state.store, &state.cuts), (&store, &cuts))
         {
-            let Changes { visibility: changes, bent } = changes_between(&state.store, &store, &change.added);
-            bent_changes = bent;
+            let Changes { visibility: changes, bent, lights } =
+                changes_between(&state.store, &store, &change.added);
+            (bent_changes, light_changes) = (bent, lights);
             applied = if change.is_empty() {
                 // Known again by its points: what shares the layout goes on doing so.
                 store = PointStore::default().carried(state.store.layout().clone(), &store);
@@ -258,6 +273,7 @@ impl Subscriber {
             cuts,
             store,
             bent_changes,
+            light_changes,
             near,
             scratch: Scratch::default(),
         });
@@ -269,7 +285,8 @@ impl Subscriber {
         let State { store, near, scratch, .. } = state;
         let changes = decode_changes(&parts, store, near, scratch)?;
         apply(store, &changes).map_err(misfit)?;
-        (state.bent_changes, state.epoch) = (changes.bent, header.epoch);
+        (state.bent_changes, state.light_changes) = (changes.bent, changes.lights);
+        state.epoch = header.epoch;
         Ok(Applied::Changes(changes.visibility))
     }
 
@@ -303,9 +320,9 @@ impl Subscriber {
             apply(&mut store, &changes).map_err(misfit)?;
         }
         let added: Vec<u32> = added.layout().sets().iter().map(|set| set.instance).collect();
-        let Changes { visibility: changes, bent } = changes_between(&state.store, &store, &added);
+        let Changes { visibility: changes, bent, lights } = changes_between(&state.store, &store, &added);
         state.cuts = state.cuts.with_sets(&gone, &cuts);
-        (state.layout_bytes, state.bent_changes) = (Vec::new(), bent);
+        (state.layout_bytes, state.bent_changes, state.light_changes) = (Vec::new(), bent, lights);
         (state.store, state.near, state.epoch) = (store, near, header.epoch);
         Ok(Applied::Sets { removed: gone, added, changes })
     }

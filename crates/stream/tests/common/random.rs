@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use dapple_store::light_visibility::{LightVisibility, OPEN};
 use dapple_store::points::{MAX_COORDINATE, PointLayout, PointStore};
 use proptest::prelude::*;
 
@@ -41,13 +42,23 @@ prop_compose! {
     }
 }
 
-/// Stores over random layouts, with or without bent normals.
+/// Stores over random layouts, with or without bent normals and visibility of lights.
 pub(crate) fn stores() -> impl Strategy<Value = PointStore> {
-    layouts().prop_flat_map(|layout| {
+    (layouts(), 0u32..4).prop_flat_map(|(layout, lights)| {
         let plane = || prop::collection::vec(any::<u8>(), layout.len());
-        (plane(), prop::option::of([plane(), plane()])).prop_map(move |(values, bent)| {
-            let store = PointStore::new(layout.clone(), values).expect("one value a point");
-            bent.map_or(store.clone(), |bent| store.with_bent(bent).expect("one a point"))
-        })
+        let of_lights = prop::collection::vec(0..=OPEN, layout.len() * lights as usize);
+        (plane(), prop::option::of([plane(), plane()]), of_lights).prop_map(
+            move |(values, bent, of_lights)| {
+                let mut store = PointStore::new(layout.clone(), values).expect("one value a point");
+                if let Some(bent) = bent {
+                    store = store.with_bent(bent).expect("one a point");
+                }
+                if lights > 0 {
+                    let lights = LightVisibility::new(&layout, lights, of_lights).expect("a few lights");
+                    store = store.with_lights(lights).expect("one a point and light");
+                }
+                store
+            },
+        )
     })
 }

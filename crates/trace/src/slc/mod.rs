@@ -28,8 +28,8 @@ pub use changes::{Changes, Moment};
 pub use paper::PaperParams;
 pub use places::{EntryPlace, EntryPlaces};
 pub use visibility::{
-    VisibilityCounts, VisibilityParams, VisibleError, retrace_visibility, trace_visibility,
-    update_visibility, value_tolerances,
+    LightTracker, TrackerParams, VisibilityCounts, VisibilityParams, VisibleError, retrace_visibility,
+    trace_visibility, update_visibility, value_tolerances,
 };
 
 /// Most samples of an entry in one update.

@@ -159,6 +159,11 @@ impl Settings {
         Ok(())
     }
 
+    /// Whether pictures have direct light of whatever emits.
+    pub(in crate::eval) fn has_area_lights(&self) -> bool {
+        self.methods.contains(&Method::Slc)
+    }
+
     /// The slowest of the rates, or the client's own where all are faster.
     pub(in crate::eval) fn slowest_hz(&self) -> f64 {
         self.hz.iter().copied().fold(CLIENT_HZ, f64::min)

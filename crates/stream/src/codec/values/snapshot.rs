@@ -47,6 +47,10 @@ pub(crate) fn code_values<C: Coder>(
             palette.push(value);
         }
     }
+    // Who claims many planes and sends none is found out here, not after all of them.
+    if coder.is_exhausted() {
+        return Err("end early");
+    }
     let top = match palette[..] {
         [] => return Err("are none"),
         [only] => return Ok(vec![only; points]),

@@ -3,6 +3,7 @@
 use dapple_scene::{Pose, Scene};
 use glam::Vec3;
 
+use crate::rtao::Site;
 use crate::sampling::hash;
 
 /// A triangle, a side and a place on it. The point follows the triangle wherever it is posed.
@@ -32,6 +33,16 @@ impl Anchor {
         let u = (barycentrics[0].clamp(0.0, 1.0) * 65535.0).round() as u16;
         let v = ((barycentrics[1].clamp(0.0, 1.0) * 65535.0).round() as u16).min(65535 - u);
         Anchor { triangle_and_side: triangle | if back { BACK } else { 0 }, barycentrics: [u, v] }
+    }
+
+    /// As a place to trace from, with the key that the point has for ever; `None` where the posed triangle has no normal.
+    pub(crate) fn site_world(&self, scene: &Scene, pose: &Pose, instance: u32) -> Option<Site> {
+        let posed = self.pose(scene, pose, instance as usize)?;
+        Some(Site {
+            position_world: posed.position,
+            normal_world: posed.normal,
+            key: u64::from(self.site(instance)),
+        })
     }
 
     /// Index of the triangle in the mesh.

@@ -82,20 +82,24 @@ impl GeneratedPoints {
     /// Where the points are in the world at a pose, in the order of the layout, as sites to trace: keys are the points' own for
     /// ever. `None` where a posed triangle has no normal.
     pub fn sites_world(&self, scene: &Scene, pose: &Pose) -> Vec<Option<Site>> {
-        let mut sites = Vec::with_capacity(self.anchors.len());
-        for set in self.layout.sets() {
-            let first = set.first as usize;
-            sites.par_extend(self.anchors[first..first + set.len()].par_iter().map(|anchor| {
-                let posed = anchor.pose(scene, pose, set.instance as usize)?;
-                Some(Site {
-                    position_world: posed.position,
-                    normal_world: posed.normal,
-                    key: u64::from(anchor.site(set.instance)),
-                })
-            }));
-        }
-        sites
+        sites_world(&self.layout, &self.anchors, scene, pose)
     }
+}
+
+/// [`GeneratedPoints::sites_world`] of a layout and the anchors of its points.
+pub fn sites_world(
+    layout: &PointLayout,
+    anchors: &[Anchor],
+    scene: &Scene,
+    pose: &Pose,
+) -> Vec<Option<Site>> {
+    let mut sites = Vec::with_capacity(anchors.len());
+    for set in layout.sets() {
+        let first = set.first as usize;
+        let anchors = anchors[first..first + set.len()].par_iter();
+        sites.par_extend(anchors.map(|anchor| anchor.site_world(scene, pose, set.instance)));
+    }
+    sites
 }
 
 /// Why no points could be laid.

@@ -5,6 +5,7 @@
 
 #[cfg(test)]
 mod tests;
+mod tracker;
 
 use dapple_scene::area_lights::{AreaLights, luminance};
 use dapple_scene::glam::Vec3;
@@ -12,7 +13,9 @@ use dapple_store::light_visibility::{LightChange, LightVisibility, LightVisibili
 use dapple_store::points::PointLayout;
 use rayon::prelude::*;
 
-use super::Changes;
+pub use tracker::{LightTracker, TrackerParams};
+
+use super::{Changes, Moment};
 use crate::bvh::{MAX_DIRECTIONS, Tracer, offset_origin};
 use crate::direct::{Draws, Sequence};
 use crate::rtao::Site;
@@ -53,7 +56,8 @@ pub struct VisibilityCounts {
 }
 
 impl VisibilityCounts {
-    fn add(self, other: VisibilityCounts) -> VisibilityCounts {
+    /// Both together.
+    pub fn add(self, other: VisibilityCounts) -> VisibilityCounts {
         VisibilityCounts {
             traced: self.traced + other.traced,
             changed: self.changed + other.changed,
@@ -267,6 +271,15 @@ impl Default for VisibleError {
     }
 }
 
+impl VisibleError {
+    /// By how many steps the value of a light may be off at a point of this irradiance, where the light would give `arriving`; 255 where it does not
+    /// matter.
+    fn steps(&self, irradiance: f32, arriving: f32) -> u8 {
+        let may = f32::from(OPEN) * self.relative * (irradiance + self.floor);
+        if arriving > 0.0 { (may / arriving).clamp(0.0, 255.0) as u8 } else { 255 }
+    }
+}
+
 /// By how many steps each value may be off before the error is seen, light by light as the values are; 255 where its light does not matter.
 pub fn value_tolerances(
     values: &LightVisibility,
@@ -291,11 +304,7 @@ pub fn value_tolerances(
         .collect();
     let tolerance = |index: usize| {
         let (light, point) = (index / points, index % points);
-        let may = steps * error.relative * (irradiance[point] + error.floor);
-        match arriving(light, point) {
-            most if most > 0.0 => (may / most).clamp(0.0, 255.0) as u8,
-            _ => 255,
-        }
+        error.steps(irradiance[point], arriving(light, point))
     };
     (0..points * count).into_par_iter().map(tolerance).collect()
 }

@@ -1,0 +1,295 @@
+//! Keeps the visibility of lights at points up to date while a scene plays, within a budget of rays.
+
+use std::sync::Arc;
+
+use dapple_scene::area_lights::AreaLights;
+use dapple_scene::{Pose, Scene};
+use dapple_store::light_visibility::{LightVisibility, LightVisibilityError, OPEN};
+use dapple_store::points::{PointLayout, PointStore};
+use rayon::prelude::*;
+
+use super::{
+    CHUNK, Changes, Moment, VisibilityCounts, VisibilityParams, VisibleError, Worker, is_usable,
+    trace_visibility,
+};
+use crate::psao::generate::{Anchor, sites_world};
+use crate::{Tracer, rtao::Site};
+
+/// How visibility of lights is kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackerParams {
+    /// Rays.
+    pub visibility: VisibilityParams,
+    /// Share of a point's irradiance below which an error is not seen, ≥ 0, default 0.1. What is off by less waits.
+    pub tolerance: f32,
+}
+
+impl Default for TrackerParams {
+    fn default() -> Self {
+        TrackerParams { visibility: VisibilityParams::default(), tolerance: 0.1 }
+    }
+}
+
+/// Irradiance that counts as black, as a share of that of the brightest hundredth of the points at first.
+const BLACK: f32 = 0.02;
+
+/// The visibility of all lights at all points, and what of it may be another than it says.
+#[derive(Clone)]
+pub struct LightTracker {
+    params: TrackerParams,
+    layout: Arc<PointLayout>,
+    /// Of the points, at the moment of the last step.
+    sites: Vec<Option<Site>>,
+    values: LightVisibility,
+    /// Which values are to be found again, one each.
+    is_due: Vec<bool>,
+    due: usize,
+    /// Where the next step goes on.
+    next: usize,
+    /// The scene as it was at the last step.
+    before: Pose,
+    black: f32,
+}
+
+impl LightTracker {
+    /// Traces all of them at a pose, in parallel in the caller's rayon pool. Anchors are those of the points of `layout`, in its order.
+    ///
+    /// # Errors
+    /// More points and lights than fit.
+    pub fn new(
+        scene: &Scene,
+        pose: &Pose,
+        tracer: &Tracer,
+        (layout, anchors): (&Arc<PointLayout>, &[Anchor]),
+        params: TrackerParams,
+    ) -> Result<LightTracker, LightVisibilityError> {
+        let sites = sites_world(layout, anchors, scene, pose);
+        let lights = AreaLights::new(scene, pose);
+        let (values, _) = trace_visibility(layout, &sites, tracer, &lights, &params.visibility)?;
+        let is_due = vec![false; values.values().len()];
+        let mut tracker = LightTracker {
+            params,
+            layout: layout.clone(),
+            sites,
+            values,
+            is_due,
+            due: 0,
+            next: 0,
+            before: pose.clone(),
+            black: 0.0,
+        };
+        let points = 0..layout.len();
+        let mut bright: Vec<f32> =
+            points.into_par_iter().map(|p| tracker.irradiance(&lights, p)).filter(|e| *e > 0.0).collect();
+        bright.par_sort_unstable_by(f32::total_cmp);
+        tracker.black = BLACK * bright.get(bright.len() * 99 / 100).copied().unwrap_or(0.0);
+        Ok(tracker)
+    }
+
+    /// What is known: as good as traced, but for what is due.
+    pub fn values(&self) -> &LightVisibility {
+        &self.values
+    }
+
+    /// How many values may be others than it says.
+    pub fn due(&self) -> usize {
+        self.due
+    }
+
+    /// Bytes held, by capacity.
+    pub fn bytes(&self) -> usize {
+        self.sites.capacity() * size_of::<Option<Site>>()
+            + self.is_due.capacity()
+            + self.values.values().len()
+    }
+
+    /// All values as all rays would find them now, at the pose of the last step: [`LightTracker::values`] where nothing is due.
+    pub fn traced_afresh(
+        &self,
+        scene: &Scene,
+        pose: &Pose,
+        tracer: &Tracer,
+    ) -> (LightVisibility, VisibilityCounts) {
+        let lights = AreaLights::new(scene, pose);
+        let mut values = self.values.clone();
+        let params = &self.params.visibility;
+        let (_, counts) = super::retrace_visibility(&mut values, &self.sites, tracer, &lights, params);
+        (values, counts)
+    }
+
+    /// Follows points that came and went: those that stay keep their values, those that came are traced here and now.
+    ///
+    /// # Errors
+    /// More points and lights than fit; nothing changes then.
+    pub fn follow(
+        &mut self,
+        scene: &Scene,
+        pose: &Pose,
+        tracer: &Tracer,
+        (layout, anchors): (&Arc<PointLayout>, &[Anchor]),
+    ) -> Result<VisibilityCounts, LightVisibilityError> {
+        if Arc::ptr_eq(&self.layout, layout) {
+            return Ok(VisibilityCounts::default());
+        }
+        let lights = AreaLights::new(scene, pose);
+        // Refuses what is too much.
+        let open = LightVisibility::open(layout, self.values.lights())?;
+        let store = |layout: &Arc<PointLayout>, values| {
+            PointStore::new(layout.clone(), vec![0; layout.len()]).and_then(|store| store.with_lights(values))
+        };
+        let was = store(&self.layout, self.values.clone());
+        let carried = was.map(|was| was.carried(layout.clone(), &PointStore::default()));
+        let values = carried.ok().and_then(|store| store.lights().cloned()).unwrap_or(open);
+        let is_new = |instance| {
+            let was = self.layout.set_of_instance(instance);
+            was.zip(layout.set_of_instance(instance)).is_none_or(|(was, is)| was.len() != is.len())
+        };
+        let points = layout.len();
+        let mut is_due = vec![false; values.values().len()];
+        for light in 0..values.lights() as usize {
+            for set in layout.sets() {
+                let at = light * points + set.first as usize..light * points + set.first as usize + set.len();
+                match self.layout.set_of_instance(set.instance).filter(|_| !is_new(set.instance)) {
+                    None => is_due[at].fill(true),
+                    Some(was) => {
+                        let first = light * self.layout.len() + was.first as usize;
+                        is_due[at].copy_from_slice(&self.is_due[first..first + was.len()]);
+                    }
+                }
+            }
+        }
+        (self.sites, self.values) = (sites_world(layout, anchors, scene, pose), values);
+        (self.layout, self.is_due, self.next) = (layout.clone(), is_due, 0);
+        self.due = self.is_due.iter().filter(|due| **due).count();
+        Ok(self.trace(tracer, &lights, None))
+    }
+
+    /// Goes on to a pose of the same points: finds what may have changed, and traces of that what `ray_budget` has rays for (`None`: all of it), each
+    /// value in its turn.
+    pub fn step(
+        &mut self,
+        scene: &Scene,
+        pose: &Pose,
+        tracer: &Tracer,
+        anchors: &[Anchor],
+        ray_budget: Option<u64>,
+    ) -> VisibilityCounts {
+        let before = std::mem::replace(&mut self.before, pose.clone());
+        let [then_lights, lights] = [&before, pose].map(|pose| AreaLights::new(scene, pose));
+        let then = Moment { scene, pose: &before, lights: &then_lights };
+        let changes = Changes::between(&then, &Moment { scene, pose, lights: &lights });
+        if !changes.is_nothing() {
+            self.observe(scene, pose, anchors, &changes);
+        }
+        self.trace(tracer, &lights, ray_budget)
+    }
+
+    /// Finds which values may be others now.
+    fn observe(&mut self, scene: &Scene, pose: &Pose, anchors: &[Anchor], changes: &Changes<'_>) {
+        let LightTracker { layout, sites, is_due, .. } = self;
+        let mut has_moved = vec![false; layout.len()];
+        for set in layout.sets().iter().filter(|set| changes.has_moved(set.instance)) {
+            let points = set.first as usize..set.first as usize + set.len();
+            has_moved[points.clone()].fill(true);
+            let places = sites[points.clone()].par_iter_mut().zip(&anchors[points]);
+            places.for_each(|(site, anchor)| *site = anchor.site_world(scene, pose, set.instance));
+        }
+        let points = layout.len().max(1);
+        for (light, is_due) in is_due.chunks_mut(points).enumerate() {
+            let all = is_due.par_iter_mut().zip(&*sites).zip(&has_moved).with_min_len(CHUNK);
+            all.for_each(|((is_due, site), has_moved)| {
+                let Some(site) = site.as_ref().filter(|site| is_usable(site)) else { return };
+                *is_due |= *has_moved || changes.may_show(light, site.position_world, site.normal_world);
+            });
+        }
+        self.due = self.is_due.par_iter().filter(|due| **due).count();
+    }
+
+    /// Traces what is due, from where the last call ended on.
+    fn trace(
+        &mut self,
+        tracer: &Tracer,
+        lights: &AreaLights<'_>,
+        ray_budget: Option<u64>,
+    ) -> VisibilityCounts {
+        let mut counts = VisibilityCounts::default();
+        let total = self.is_due.len();
+        let mut left = total;
+        while self.due > 0 && left > 0 && ray_budget.is_none_or(|budget| counts.rays < budget) {
+            // As much at a time as may fit, so that a budget is not passed by far; of all that is due if there is none.
+            let room = ray_budget.map_or(u64::MAX, |budget| budget - counts.rays);
+            let pairs = (room / u64::from(self.params.visibility.rays.max(1))).clamp(64, 1 << 16) as usize;
+            let (mut list, mut at) = (Vec::with_capacity(pairs.min(self.due)), self.next);
+            while list.len() < pairs && left > 0 {
+                if self.is_due[at] {
+                    list.push(at);
+                }
+                at = if at + 1 == total { 0 } else { at + 1 };
+                left -= 1;
+            }
+            self.next = at;
+            let found = self.find(&list, tracer, lights);
+            for (index, value, rays) in found {
+                (self.is_due[index], self.due) = (false, self.due - 1);
+                counts.rays += rays;
+                let Some(new) = value else { continue };
+                counts.traced += 1;
+                counts.changed += u64::from(self.values.set(index, new));
+            }
+        }
+        counts
+    }
+
+    /// Values at these indices, with what each took; none where the light does not reach the point.
+    fn find(
+        &self,
+        list: &[usize],
+        tracer: &Tracer,
+        lights: &AreaLights<'_>,
+    ) -> Vec<(usize, Option<u8>, u64)> {
+        let points = self.layout.len();
+        let chunk = |list: &[usize]| {
+            let mut worker = Worker::default();
+            let one = |&index: &usize| {
+                let (light, mut rays) = (index / points, 0);
+                let site = self.sites[index % points].as_ref().filter(|site| is_usable(site));
+                let site = site.filter(|s| lights.arriving(light, s.position_world, s.normal_world) > 0.0);
+                let value = site.and_then(|site| {
+                    worker.value(tracer, (light, lights), site, &self.params.visibility, &mut rays)
+                });
+                (index, value, rays)
+            };
+            list.iter().map(one).collect::<Vec<_>>()
+        };
+        list.par_chunks(CHUNK).flat_map_iter(chunk).collect()
+    }
+
+    /// By how many steps values may be off, of those that differ from what is `held` elsewhere of the same points: index and steps, ascending.
+    /// `pose` is that of the last step.
+    pub fn tolerances(&self, held: &LightVisibility, scene: &Scene, pose: &Pose) -> Vec<(u32, u8)> {
+        let lights = AreaLights::new(scene, pose);
+        let error = VisibleError { relative: self.params.tolerance, floor: self.black };
+        let pairs = held.values().par_iter().zip(self.values.values()).enumerate();
+        let differ = pairs.filter(|(_, (held, new))| held != new);
+        let steps = |(index, _): (usize, _)| (index as u32, self.tolerance(index, &lights, &error));
+        differ.map(steps).collect()
+    }
+
+    fn tolerance(&self, index: usize, lights: &AreaLights<'_>, error: &VisibleError) -> u8 {
+        let (light, point) = (index / self.layout.len(), index % self.layout.len());
+        error.steps(self.irradiance(lights, point), self.arriving(lights, light, point))
+    }
+
+    fn arriving(&self, lights: &AreaLights<'_>, light: usize, point: usize) -> f32 {
+        let site = self.sites[point].as_ref().filter(|site| is_usable(site));
+        site.map_or(0.0, |site| lights.arriving(light, site.position_world, site.normal_world))
+    }
+
+    fn irradiance(&self, lights: &AreaLights<'_>, point: usize) -> f32 {
+        let of = |light: usize| {
+            let value = self.values.get(point, light as u32).unwrap_or(OPEN);
+            self.arriving(lights, light, point) * f32::from(value) / f32::from(OPEN)
+        };
+        (0..self.values.lights() as usize).map(of).sum()
+    }
+}
