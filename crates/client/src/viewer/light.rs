@@ -4,9 +4,11 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use dapple_gpu::Gpu;
+use dapple_render::area_lights::AreaLightTable;
 use dapple_render::forward::{AtlasBand, ForwardError, GpuScene};
-use dapple_render::psao::atlas::{AtlasParams, PointChange, VisibilityAtlas};
-use dapple_scene::Scene;
+use dapple_render::psao::atlas::{AtlasParams, DirtyBand, PointChange, VisibilityAtlas};
+use dapple_scene::area_lights::AreaLights;
+use dapple_scene::{Pose, Scene};
 use dapple_stream::{Applied, ReceiveError, ValueChange};
 
 use super::inspect::Inspection;
@@ -19,6 +21,10 @@ pub(super) struct Light {
     pub(super) received: Received,
     pub(super) atlas: Option<VisibilityAtlas>,
     pub(super) inspection: Inspection,
+    /// Lights whose visibility the atlas has.
+    lights: u32,
+    /// Whether area lights lie on the card.
+    is_lit: bool,
     /// Whether what lies on the card is of another atlas.
     is_new: bool,
     /// When the running fade began, seconds; long ago if none runs.
@@ -37,6 +43,8 @@ impl Light {
             received,
             atlas: None,
             inspection,
+            lights: 0,
+            is_lit: false,
             is_new: false,
             fade_start_s: f64::NEG_INFINITY,
             paces: BTreeMap::new(),
@@ -76,7 +84,24 @@ impl Light {
             Applied::Changes(changes) => self.apply(part, changes, now_s, fade_s),
             Applied::Ignored(_) => {}
         }
+        self.take_lights(&applied);
         Ok(applied)
+    }
+
+    /// Takes over what a frame changed of the visibility of lights; of instances that become ready [`Light::work`] takes it in.
+    fn take_lights(&mut self, applied: &Applied) {
+        let (Some(atlas), Some(store)) = (&mut self.atlas, self.received.store()) else { return };
+        let lights = store.lights();
+        let count = lights.map_or(0, |lights| lights.lights());
+        if std::mem::replace(&mut self.lights, count) != count {
+            // Others than before: what was taken in is of no use.
+            atlas.forget_lights();
+            if let Some(lights) = lights {
+                atlas.resolve_lights(lights);
+            }
+        } else if matches!(applied, Applied::Changes(_) | Applied::Sets { .. }) {
+            atlas.apply_lights(self.received.light_changes());
+        }
     }
 
     fn apply(&mut self, part: Option<u8>, changes: &[ValueChange], now_s: f64, fade_s: Option<f32>) {
@@ -103,6 +128,9 @@ impl Light {
         let before = atlas.ready_count();
         let progress = atlas.work(&self.scene, store.visibility(), texels);
         if atlas.ready_count() > before {
+            if let Some(lights) = store.lights() {
+                atlas.resolve_lights(lights);
+            }
             // All texels share one fade: it begins anew, for the others from what they show.
             atlas.begin_update(fade_at(self.fade_start_s, now_s, fade_s));
             // An update that has come since shows nothing of its fade yet: they begin together.
@@ -151,11 +179,7 @@ impl Light {
             gpu_scene.set_charts(gpu, instance, charts)?;
             gpu_scene.set_pages(gpu, instance, atlas.placements(instance))?;
         }
-        let dirty = atlas.take_dirty();
-        let bands: Vec<AtlasBand> = dirty
-            .into_iter()
-            .map(|band| AtlasBand { layer: band.layer, first_row: band.y.start, end_row: band.y.end })
-            .collect();
+        let bands = bands_of(atlas.take_dirty());
         if !bands.is_empty() {
             let layers: Vec<&[[u8; 2]]> = (0..atlas.layers()).map(|layer| atlas.texels(layer)).collect();
             gpu_scene.upload_atlas(gpu, atlas.side(), &layers, &bands)?;
@@ -163,6 +187,32 @@ impl Light {
         }
         Ok(())
     }
+
+    /// Brings the area lights of a pose onto the card, and what changed of how much is seen of them; takes them off it if they are not
+    /// `wanted`, or the stream says nothing of them. What fails is not tried again before another layout comes.
+    pub(super) fn upload_lights(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene, pose: &Pose, wanted: bool) {
+        let is_lit = wanted && self.lights > 0 && self.problem.is_none();
+        if !is_lit && self.is_lit {
+            gpu_scene.set_area_lights(gpu, &AreaLightTable::default());
+        }
+        self.is_lit = is_lit;
+        let Some(atlas) = self.atlas.as_mut().filter(|_| is_lit) else { return };
+        let table = AreaLightTable::new(&AreaLights::new(&self.scene, pose));
+        atlas.show_lights(table.lights());
+        let bands = bands_of(atlas.take_dirty_lights());
+        if !bands.is_empty() {
+            let groups: Vec<_> = atlas.light_texels().iter().map(Vec::as_slice).collect();
+            let uploaded = gpu_scene.upload_lights(gpu, atlas.side(), &groups, &bands);
+            self.problem = uploaded.err().map(|error| error.to_string());
+        }
+        gpu_scene.set_area_lights(gpu, &table);
+    }
+}
+
+fn bands_of(dirty: Vec<DirtyBand>) -> Vec<AtlasBand> {
+    let band =
+        |band: DirtyBand| AtlasBand { layer: band.layer, first_row: band.y.start, end_row: band.y.end };
+    dirty.into_iter().map(band).collect()
 }
 
 /// How far a fade is at `now_s` that began at `start_s` and takes `fade_s`.

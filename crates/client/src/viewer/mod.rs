@@ -212,6 +212,7 @@ impl Viewer {
         } else {
             self.scene.pose_undeformed_edited(scene_time_s, &self.edits)
         };
+        self.light.upload_lights(gpu, &mut self.gpu_scene, &pose, options.area_lights);
         if wants_points {
             self.place_points(gpu, &pose);
         }

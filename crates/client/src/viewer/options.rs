@@ -150,7 +150,7 @@ impl DebugView {
 }
 
 /// How one picture is drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DrawOptions {
     /// What it shows.
     pub view: DebugView,
@@ -167,6 +167,23 @@ pub struct DrawOptions {
     pub fade_s: Option<f32>,
     /// Radiance to display.
     pub tone_map: ToneMap,
+    /// Whether light of area lights is drawn where the stream tells how much of each is seen. Default true.
+    pub area_lights: bool,
+}
+
+impl Default for DrawOptions {
+    fn default() -> Self {
+        DrawOptions {
+            view: DebugView::default(),
+            method: Method::default(),
+            split: None,
+            fallback: None,
+            screen: ScreenOptions::default(),
+            fade_s: None,
+            tone_map: ToneMap::default(),
+            area_lights: true,
+        }
+    }
 }
 
 /// Work of a viewer after a snapshot, in texels.

@@ -1,6 +1,7 @@
 //! What has come off the wire: light as one, or in parts.
 
 use dapple_store::charts::Cuts;
+use dapple_store::light_visibility::LightChange;
 use dapple_store::points::PointStore;
 use dapple_stream::{Applied, Limits, Parts, ReceiveError, Subscriber};
 
@@ -67,6 +68,11 @@ impl Received {
 
     pub(super) fn cuts(&self) -> Option<&Cuts> {
         self.parts.as_ref().map_or_else(|| self.whole.cuts(), |parts| Some(parts.cuts()))
+    }
+
+    /// Values of lights that the last frame changed at points that stayed.
+    pub(super) fn light_changes(&self) -> &[LightChange] {
+        self.parts.as_ref().map_or_else(|| self.whole.light_changes(), Parts::light_changes)
     }
 
     /// Group and epoch of light that came as one.

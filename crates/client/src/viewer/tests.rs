@@ -1,6 +1,7 @@
 //! The viewer against the client on the processor, and what it promises about work, fades and wrong frames.
 
 mod edits;
+mod lights;
 mod parts;
 
 use std::sync::Arc;

@@ -4,7 +4,7 @@
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
-use dapple_scene::area_lights::{LightFigure, LightForm, LightPlace, luminance};
+use dapple_scene::area_lights::{LightFigure, LightForm, LightPlace, LightTriangle, luminance};
 use glam::Vec3;
 
 /// Light of one light at one place, as a cone.
@@ -21,7 +21,7 @@ pub struct Arrival {
 /// Radii of a flat light away from which it is a point.
 const FAR_RADII: f32 = 20.0;
 /// Radii over the plane of a flat light up to which a place is in it.
-const IN_PLANE_RADII: f32 = 1e-4;
+const IN_PLANE_RADII: f32 = 1e-6;
 /// Sine of a cone's angle up to which what is above the horizon of it is that of a disc.
 const NARROW_SINE: f32 = 0.2;
 
@@ -41,6 +41,9 @@ pub(super) fn arrive(
         LightForm::Quad { corners, normal } => {
             let (height, side) = side_of(*normal, position - corners[0], figure.two_sided, ball.1)?;
             quad(corners, ball, position, height, *normal * side)
+        }
+        LightForm::Triangles(triangles) => {
+            return from_triangles(triangles, ball.1, figure.two_sided, position, normal);
         }
         LightForm::Places(places) => return from_places(places, figure.two_sided, position, normal),
     };
@@ -100,19 +103,18 @@ fn quad(corners: &[Vec3; 4], ball: (Vec3, f32), position: Vec3, height: f32, nor
         let area = 0.5 * (corners[2] - corners[0]).cross(corners[3] - corners[1]).length();
         return offset * (area * height / (distance2 * distance2));
     }
-    let to = corners.map(|corner| corner - position);
-    let lengths = to.map(|v| v.length().max(f32::MIN_POSITIVE));
-    let mut sum = Vec3::ZERO;
-    for i in 0..4 {
-        let j = (i + 1) % 4;
-        let both = lengths[i] * lengths[j];
-        let cosine = (to[i].dot(to[j]) / both).clamp(-1.0, 1.0);
-        // The edge itself, not the other corner: so that far corners do not cancel.
-        sum += to[i].cross(corners[j] - corners[i]) * (angle_over_sine(cosine) / both);
-    }
+    let [a, b, c, d] = corners.map(|corner| corner - position);
     // Corners may turn either way.
-    let vector = sum * 0.5;
+    let vector = (edge(a, b) + edge(b, c) + edge(c, d) + edge(d, a)) * 0.5;
     if vector.dot(normal) > 0.0 { -vector } else { vector }
+}
+
+/// The angle between two corners, about the axis that they turn about.
+fn edge(a: Vec3, b: Vec3) -> Vec3 {
+    let both = (a.length() * b.length()).max(1e-30);
+    let cosine = (a.dot(b) / both).clamp(-1.0, 1.0);
+    // The edge itself, not the other corner: so that far corners do not cancel.
+    a.cross(b - a) * (angle_over_sine(cosine) / both)
 }
 
 /// Angle / sine by the cosine.
@@ -157,41 +159,87 @@ fn raised(axis: Vec3, normal: Vec3, cosine: f32, sin2: f32) -> (Vec3, f32) {
     ((axis + normal * (half_height - cosine)).normalize_or(normal), sine * half_height)
 }
 
-/// Sums over places, each of which is a small cone.
+/// Sum of what comes from parts of a light, each of which is a small cone.
+struct Gathered<'a> {
+    normal: &'a Vec3,
+    irradiance: Vec3,
+    vector: Vec3,
+    fluence: f32,
+    /// Irradiance of unit radiance.
+    form_factor: f32,
+}
+
+impl Gathered<'_> {
+    fn new(normal: &Vec3) -> Gathered<'_> {
+        Gathered { normal, irradiance: Vec3::ZERO, vector: Vec3::ZERO, fluence: 0.0, form_factor: 0.0 }
+    }
+
+    /// A part whose axis has that cosine; by the squared sine of its cone's angle.
+    fn add(&mut self, axis: Vec3, cosine: f32, sin2: f32, radiance: Vec3) {
+        let form_factor = above_horizon(cosine, sin2);
+        if form_factor <= 0.0 {
+            return;
+        }
+        self.irradiance += radiance * (PI * form_factor);
+        self.form_factor += form_factor;
+        // A part at the horizon is there by what is above.
+        let sine = sin2.sqrt();
+        let above = if cosine < sine { 0.5 * (cosine + sine) / sine } else { 1.0 };
+        let share = luminance(radiance) * above * sin2;
+        self.vector += raised(axis, *self.normal, cosine, sin2).0 * share;
+        // Solid angle over π, without cancellation where it is small.
+        self.fluence += share * 2.0 / (1.0 + (1.0 - sin2).max(0.0).sqrt());
+    }
+
+    fn arrival(self) -> Option<Arrival> {
+        let direction = self.vector.try_normalize()?;
+        let cos_angle = (2.0 * self.vector.length() / self.fluence - 1.0).clamp(-1.0, 1.0);
+        // Parts that overlap are no more than light from all sides.
+        let irradiance = self.irradiance / self.form_factor.max(1.0);
+        (irradiance != Vec3::ZERO).then_some(Arrival { irradiance, direction, cos_angle })
+    }
+}
+
+fn from_triangles(
+    triangles: &[LightTriangle],
+    radius: f32,
+    two_sided: bool,
+    position: Vec3,
+    normal: Vec3,
+) -> Option<Arrival> {
+    let mut gathered = Gathered::new(&normal);
+    for triangle in triangles {
+        let [a, b, c] = triangle.corners.map(|corner| corner - position);
+        let cross = (b - a).cross(c - a);
+        let facing = -cross.dot(a);
+        let is_seen = facing > 0.0 || two_sided;
+        if !is_seen || facing.abs() <= IN_PLANE_RADII * radius * cross.length() {
+            continue;
+        }
+        // Seen from the front, corners turn against the view.
+        let vector = (edge(a, b) + edge(b, c) + edge(c, a)) * if facing > 0.0 { -0.5 } else { 0.5 };
+        let length = vector.length();
+        let Some(axis) = vector.try_normalize() else { continue };
+        gathered.add(axis, normal.dot(axis), (length * FRAC_1_PI).min(1.0), triangle.radiance);
+    }
+    gathered.arrival()
+}
+
 fn from_places(places: &[LightPlace], two_sided: bool, position: Vec3, normal: Vec3) -> Option<Arrival> {
-    let (mut irradiance, mut vector, mut fluence) = (Vec3::ZERO, Vec3::ZERO, 0.0f32);
+    let mut gathered = Gathered::new(&normal);
     for place in places {
         let offset = place.position_world - position;
         let distance2 = offset.length_squared();
-        let Some(direction) = offset.try_normalize() else { continue };
-        let facing = -place.normal_world.dot(direction);
+        let Some(axis) = offset.try_normalize() else { continue };
+        let facing = -place.normal_world.dot(axis);
         let facing = if two_sided { facing.abs() } else { facing };
         if facing <= 0.0 {
             continue;
         }
-        // As a disc of its area would be seen from above its middle: never more than half of all directions.
-        let solid_angle = place.area_m2 * facing / (distance2 + place.area_m2 * FRAC_1_PI);
-        let cosine = normal.dot(direction);
-        let sin2 = solid_angle * FRAC_1_PI * (1.0 - 0.25 * FRAC_1_PI * solid_angle);
-        let sine = sin2.sqrt();
-        if cosine <= -sine {
-            continue;
-        }
-        // A place at the horizon is there by the part that is above.
-        let (part, mean_cosine) = match cosine < sine {
-            true => {
-                let above = cosine + sine;
-                (0.5 * above / sine, 0.25 * above * above / sine)
-            }
-            false => (1.0, cosine),
-        };
-        irradiance += place.radiance * (solid_angle * mean_cosine);
-        let share = luminance(place.radiance) * solid_angle * part;
-        fluence += share;
-        vector +=
-            raised(direction, normal, cosine, sin2).0 * (share * (1.0 - 0.25 * FRAC_1_PI * solid_angle));
+        // Over π as `sin2` is: area × cosine / distance², but never more than all that a plane can fill.
+        let own = place.area_m2 * FRAC_1_PI;
+        let sin2 = own * facing / (distance2 * distance2 + own * own).sqrt();
+        gathered.add(axis, normal.dot(axis), sin2, place.radiance);
     }
-    let direction = vector.try_normalize()?;
-    let cos_angle = (2.0 * vector.length() / fluence - 1.0).clamp(-1.0, 1.0);
-    (irradiance != Vec3::ZERO).then_some(Arrival { irradiance, direction, cos_angle })
+    gathered.arrival()
 }

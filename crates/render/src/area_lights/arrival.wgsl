@@ -1,7 +1,7 @@
 // What arrives of one area light at one place with nothing in the way. The twin is `area_lights/arrival.rs`, whose constants these are.
 
 const AREA_FAR_RADII: f32 = 20.0;
-const AREA_IN_PLANE_RADII: f32 = 1e-4;
+const AREA_IN_PLANE_RADII: f32 = 1e-6;
 const AREA_NARROW_SINE: f32 = 0.2;
 const AREA_PI: f32 = 3.1415927;
 
@@ -11,7 +11,8 @@ const AREA_FIRST_PLACE: i32 = 3;
 const AREA_SPHERE: i32 = 1;
 const AREA_DISC: i32 = 2;
 const AREA_QUAD: i32 = 3;
-const AREA_PLACES: i32 = 4;
+const AREA_TRIANGLES: i32 = 4;
+const AREA_PLACES: i32 = 5;
 
 // Light as a cone; nothing arrives where it is black.
 struct AreaArrival {
@@ -38,6 +39,9 @@ fn area_arrival(slot: i32, position: vec3<f32>, normal: vec3<f32>) -> AreaArriva
     }
     let facing = area_texel(slot, 2);
     let two_sided = facing.w != 0.0;
+    if form == AREA_TRIANGLES {
+        return area_from_triangles(slot, i32(facing.x), ball.w, two_sided, position, normal);
+    }
     if form == AREA_PLACES {
         return area_from_places(slot, i32(facing.x), facing.y != 0.0, two_sided, position, normal, shine.xyz);
     }
@@ -170,7 +174,83 @@ fn area_raised(axis: vec3<f32>, normal: vec3<f32>, cosine: f32, sin2: f32) -> ve
     return vec4(unit_or(axis + normal * (half_height - cosine), normal), sine * half_height);
 }
 
-// Sums over places, each of which is a small cone.
+// Sum of what comes from parts of a light, each of which is a small cone.
+struct AreaGathered {
+    irradiance: vec3<f32>,
+    vector: vec3<f32>,
+    fluence: f32,
+    // Irradiance of unit radiance.
+    form_factor: f32,
+}
+
+// With a part; by its axis and the squared sine of its cone's angle.
+fn area_add(before: AreaGathered, normal: vec3<f32>, axis: vec3<f32>, sin2: f32, radiance: vec3<f32>) -> AreaGathered {
+    let cosine = dot(normal, axis);
+    let form_factor = area_above_horizon(cosine, sin2);
+    if form_factor <= 0.0 {
+        return before;
+    }
+    var sum = before;
+    sum.irradiance += radiance * (AREA_PI * form_factor);
+    sum.form_factor += form_factor;
+    // A part at the horizon is there by what is above.
+    let sine = sqrt(sin2);
+    var above = 1.0;
+    if cosine < sine {
+        above = 0.5 * (cosine + sine) / sine;
+    }
+    let share = dot(radiance, vec3(0.2126, 0.7152, 0.0722)) * above * sin2;
+    sum.vector += area_raised(axis, normal, cosine, sin2).xyz * share;
+    // Solid angle over π, without cancellation where it is small.
+    sum.fluence += share * 2.0 / (1.0 + sqrt(max(1.0 - sin2, 0.0)));
+    return sum;
+}
+
+fn area_sum(sum: AreaGathered, normal: vec3<f32>) -> AreaArrival {
+    let vector_length = length(sum.vector);
+    if vector_length <= 0.0 {
+        return AreaArrival(vec3(0.0), normal, 1.0);
+    }
+    let cos_angle = clamp(2.0 * vector_length / sum.fluence - 1.0, -1.0, 1.0);
+    // Parts that overlap are no more than light from all sides.
+    return AreaArrival(sum.irradiance / max(sum.form_factor, 1.0), sum.vector / vector_length, cos_angle);
+}
+
+fn area_from_triangles(
+    slot: i32,
+    count: i32,
+    radius: f32,
+    two_sided: bool,
+    position: vec3<f32>,
+    normal: vec3<f32>,
+) -> AreaArrival {
+    var sum = AreaGathered(vec3(0.0), vec3(0.0), 0.0, 0.0);
+    for (var i = 0; i < count; i++) {
+        let texel = AREA_FIRST_PLACE + 3 * i;
+        // Corners, with one colour of the radiance each.
+        let first = area_texel(slot, texel);
+        let second = area_texel(slot, texel + 1);
+        let third = area_texel(slot, texel + 2);
+        let a = first.xyz - position;
+        let b = second.xyz - position;
+        let c = third.xyz - position;
+        let across = cross(b - a, c - a);
+        let facing = -dot(across, a);
+        if (facing <= 0.0 && !two_sided) || abs(facing) <= AREA_IN_PLANE_RADII * radius * length(across) {
+            continue;
+        }
+        // Seen from the front, corners turn against the view.
+        let vector = (area_edge(a, b) + area_edge(b, c) + area_edge(c, a)) * select(0.5, -0.5, facing > 0.0);
+        let vector_length = length(vector);
+        if vector_length <= 0.0 {
+            continue;
+        }
+        let radiance = vec3(first.w, second.w, third.w);
+        sum = area_add(sum, normal, vector / vector_length, min(vector_length * FRAC_1_PI, 1.0), radiance);
+    }
+    return area_sum(sum, normal);
+}
+
 fn area_from_places(
     slot: i32,
     count: i32,
@@ -180,9 +260,7 @@ fn area_from_places(
     normal: vec3<f32>,
     mean_radiance: vec3<f32>,
 ) -> AreaArrival {
-    var irradiance = vec3(0.0);
-    var vector = vec3(0.0);
-    var fluence = 0.0;
+    var sum = AreaGathered(vec3(0.0), vec3(0.0), 0.0, 0.0);
     for (var i = 0; i < count; i++) {
         let texel = AREA_FIRST_PLACE + 3 * i;
         // Place and area; its normal; its radiance, unless all shine alike.
@@ -192,42 +270,22 @@ fn area_from_places(
         if distance_squared == 0.0 {
             continue;
         }
-        let direction = offset * inverseSqrt(distance_squared);
-        var facing = -dot(area_texel(slot, texel + 1).xyz, direction);
+        let axis = offset * inverseSqrt(distance_squared);
+        var facing = -dot(area_texel(slot, texel + 1).xyz, axis);
         if two_sided {
             facing = abs(facing);
         }
         if facing <= 0.0 {
             continue;
         }
-        let solid_angle = place.w * facing / (distance_squared + place.w * FRAC_1_PI);
-        let cosine = dot(normal, direction);
-        let sin2 = solid_angle * FRAC_1_PI * (1.0 - 0.25 * FRAC_1_PI * solid_angle);
-        let sine = sqrt(sin2);
-        if cosine <= -sine {
-            continue;
-        }
-        var part = 1.0;
-        var mean_cosine = cosine;
-        if cosine < sine {
-            let above = cosine + sine;
-            part = 0.5 * above / sine;
-            mean_cosine = 0.25 * above * above / sine;
-        }
+        // Area × cosine / distance², but never more than all that a plane can fill.
+        let own = place.w * FRAC_1_PI;
+        let sin2 = own * facing / sqrt(distance_squared * distance_squared + own * own);
         var radiance = mean_radiance;
         if !is_even {
             radiance = area_texel(slot, texel + 2).xyz;
         }
-        irradiance += radiance * (solid_angle * mean_cosine);
-        let share = dot(radiance, vec3(0.2126, 0.7152, 0.0722)) * solid_angle * part;
-        fluence += share;
-        let left = area_raised(direction, normal, cosine, sin2);
-        vector += left.xyz * (share * (1.0 - 0.25 * FRAC_1_PI * solid_angle));
+        sum = area_add(sum, normal, axis, sin2, radiance);
     }
-    let vector_length = length(vector);
-    if vector_length <= 0.0 {
-        return AreaArrival(vec3(0.0), normal, 1.0);
-    }
-    let cos_angle = clamp(2.0 * vector_length / fluence - 1.0, -1.0, 1.0);
-    return AreaArrival(irradiance, vector / vector_length, cos_angle);
+    return area_sum(sum, normal);
 }

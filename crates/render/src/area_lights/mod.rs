@@ -24,7 +24,10 @@ use crate::slc::cap::{Cap, Lens};
 /// Most lights that are shown.
 pub const MAX_AREA_LIGHTS: usize = 64;
 
-/// Most places that stand for a light that is no simple form.
+/// Most triangles of a light that is none of the simple forms and still told by them.
+pub const MAX_TRIANGLES: usize = 16;
+
+/// Most places that stand for a light of more triangles.
 pub const MAX_PLACES: usize = 32;
 
 /// Lights that are shown, and their forms at one moment.
@@ -56,7 +59,7 @@ impl AreaLightTable {
             shown.sort_unstable();
         }
         let entry = |light: &usize| {
-            let figure = lights.figure(*light, MAX_PLACES)?;
+            let figure = lights.figure(*light, MAX_TRIANGLES, MAX_PLACES)?;
             let (center, radius) = figure.form.ball();
             (center.is_finite() && radius.is_finite()).then_some(Entry { figure, center, radius })
         };

@@ -3,24 +3,26 @@
 use dapple_scene::area_lights::LightForm;
 use glam::Vec3;
 
-use super::{AreaLightTable, Entry, MAX_PLACES};
+use super::{AreaLightTable, Entry, MAX_PLACES, MAX_TRIANGLES};
 
 /// Texels of a row: one row a light.
 pub(crate) const TABLE_WIDTH: usize = FIRST_PLACE + 3 * MAX_PLACES;
-/// The first texel of a row that is a corner, or of a place.
+/// The first texel of a row that is a corner, or of a triangle or place: three each.
 const FIRST_PLACE: usize = 3;
 
 // Forms; 0 is a light that does not shine.
 const SPHERE: f32 = 1.0;
 const DISC: f32 = 2.0;
 const QUAD: f32 = 3.0;
-const PLACES: f32 = 4.0;
+const TRIANGLES: f32 = 4.0;
+const PLACES: f32 = 5.0;
 
 impl AreaLightTable {
     /// Row by row; as many rows as [`AreaLightTable::lights`].
     ///
-    /// A row: centre and radius of a ball that holds the light; radiance and form; normal, or number of places and whether all shine alike, and
-    /// whether both sides do; then corners, or of each place position and area, normal, radiance.
+    /// A row: centre and radius of a ball that holds the light; radiance and form; normal, or number of parts and whether all shine alike, and
+    /// whether both sides do; then corners, or of each triangle its corners with one colour of its radiance each, or of each place position and
+    /// area, normal, radiance.
     pub(crate) fn texels(&self) -> Vec<[f32; 4]> {
         let mut texels = vec![[0.0; 4]; self.entries.len() * TABLE_WIDTH];
         for (row, entry) in texels.chunks_exact_mut(TABLE_WIDTH).zip(&self.entries) {
@@ -44,6 +46,15 @@ fn write(row: &mut [[f32; 4]], Entry { figure, center, radius }: &Entry) {
                 *texel = four(*corner, 0.0);
             }
             (QUAD, four(*normal, two_sided))
+        }
+        LightForm::Triangles(triangles) => {
+            let count = triangles.len().min(MAX_TRIANGLES);
+            for (texels, triangle) in row[FIRST_PLACE..].chunks_exact_mut(3).zip(triangles).take(count) {
+                for (k, texel) in texels.iter_mut().enumerate() {
+                    *texel = four(triangle.corners[k], triangle.radiance[k]);
+                }
+            }
+            (TRIANGLES, [count as f32, 0.0, 0.0, two_sided])
         }
         LightForm::Places(places) => {
             let count = places.len().min(MAX_PLACES);

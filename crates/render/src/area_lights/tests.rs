@@ -48,16 +48,16 @@ fn kinds() -> Vec<(&'static str, Stage, f32)> {
         (
             "cube",
             lit(cube(), EmitterShape::Triangles, tilt * Affine3A::from_scale(Vec3::splat(0.57)), false),
-            0.05,
+            0.003,
         ),
-        ("faceted ball", lit(sphere(12, 20), EmitterShape::Triangles, tilt, false), 0.05),
+        ("faceted ball", lit(sphere(12, 20), EmitterShape::Triangles, tilt, false), 0.3),
     ]
 }
 
 /// Irradiance of the only light by so many places on it.
 fn summed(stage: &Stage, position: Vec3, value: impl Fn(Vec3) -> Vec3) -> Vec3 {
     let lights = AreaLights::new(&stage.scene, &stage.pose);
-    let count = 40_000u32;
+    let count = 6000u32;
     let mut sum = Vec3::ZERO;
     for i in 0..count {
         let u = [
@@ -129,10 +129,10 @@ fn irradiance_of_all_forms_is_that_of_many_places() {
     for (name, stage, tolerance) in kinds() {
         let table = table(&stage);
         let (mut worst, mut worst_cut) = (0.0f32, 0.0f32);
-        for (i, towards) in directions(24).enumerate() {
+        for (i, towards) in directions(11).enumerate() {
             for distance in [2.0, 3.0, 8.0, 19.9, 20.1] {
                 let position = towards * distance;
-                for normal in directions(7) {
+                for normal in directions(5) {
                     let normal = (normal - towards * (i % 3) as f32).normalize();
                     let exact = summed(&stage, position, |l| Vec3::splat(normal.dot(l).max(0.0)));
                     // Against what a surface that faces the light would have at that distance.
@@ -146,8 +146,8 @@ fn irradiance_of_all_forms_is_that_of_many_places() {
             }
         }
         println!("{name}: {worst}, at the horizon {worst_cut}");
-        assert!(worst < tolerance + 0.002, "{name}: {worst}");
-        assert!(worst_cut < tolerance + 0.03, "{name}, at the horizon: {worst_cut}");
+        assert!(worst < tolerance, "{name}: {worst}");
+        assert!(worst_cut < tolerance + 0.013, "{name}, at the horizon: {worst_cut}");
     }
 }
 
@@ -178,9 +178,12 @@ fn surface(
 fn what_is_reflected_is_what_many_places_give() {
     for (name, stage, tolerance) in kinds() {
         let table = table(&stage);
-        for (roughness, metallic, specular, most) in
-            [(1.0, 0.0, false, 0.005), (1.0, 0.0, true, 0.06), (0.6, 1.0, true, 0.2), (0.35, 0.0, true, 0.2)]
-        {
+        for (roughness, metallic, specular, most) in [
+            (1.0, 0.0, false, 0.005),
+            (1.0, 0.0, true, 0.005),
+            (0.6, 1.0, true, 0.06),
+            (0.35, 0.0, true, 0.1),
+        ] {
             let (mut difference, mut total) = (0.0, 0.0);
             for towards in directions(12) {
                 for distance in [2.0, 6.0] {
@@ -209,14 +212,14 @@ fn what_is_reflected_is_what_many_places_give() {
 
 #[test]
 fn no_light_gives_more_than_light_from_all_sides() {
-    for (name, stage, tolerance) in kinds() {
+    for (name, stage, _) in kinds() {
         let table = table(&stage);
         for towards in directions(40) {
             for distance in [0.0, 1e-6, 0.01, 0.2, 0.56, 0.57, 0.999, 1.0, 1.000_01, 1.01, 1.2] {
                 let position = towards * distance;
                 for normal in directions(9) {
                     let Some(arrival) = table.arrival(0, position, normal) else { continue };
-                    let most = RADIANCE * (PI * (1.01 + tolerance));
+                    let most = RADIANCE * (PI * 1.001);
                     let Arrival { irradiance, direction, cos_angle } = arrival;
                     assert!(
                         irradiance.cmple(most).all() && irradiance.cmpge(Vec3::ZERO).all(),

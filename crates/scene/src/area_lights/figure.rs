@@ -44,8 +44,19 @@ pub enum LightForm {
         /// Unit, of the side that shines.
         normal: Vec3,
     },
+    /// Few triangles, at least one.
+    Triangles(Vec<LightTriangle>),
     /// Anything else: places that stand for pieces of its surface, at least one.
     Places(Vec<LightPlace>),
+}
+
+/// A triangle that shines evenly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightTriangle {
+    /// Metres, world; counter-clockwise from the side that shines.
+    pub corners: [Vec3; 3],
+    /// W/(m² sr), RGB.
+    pub radiance: Vec3,
 }
 
 /// A place that stands for a piece of a light's surface.
@@ -62,12 +73,11 @@ pub struct LightPlace {
 }
 
 impl AreaLights<'_> {
-    /// The form of a light, with at most `places` (at least 1) where it is none of the simple ones. `None` for the environment, for what is
-    /// not there, and for what is dark or has no area.
+    /// The form of a light. One of up to `triangles` triangles (≥ 1) that is none of the simple forms is told by its triangles, cut into more where
+    /// they are textured; one of more by so many places. `None` for the environment, for what is not there, and for what is dark or has no area.
     ///
-    /// Places are the same at every moment relative to the light, so nothing flickers: with no more triangles than places each triangle is
-    /// cut evenly, else triangles are taken by power.
-    pub fn figure(&self, light: usize, places: usize) -> Option<LightFigure> {
+    /// Triangles and places are the same at every moment relative to the light, so nothing flickers. Places are taken by power.
+    pub fn figure(&self, light: usize, triangles: usize, places: usize) -> Option<LightFigure> {
         let l = self.lights.get(light)?;
         let figure = |form| Some(LightFigure { form, radiance: l.radiance, two_sided: l.two_sided });
         if !(luminance(l.radiance) > 0.0 && l.radiance.is_finite()) {
@@ -86,40 +96,50 @@ impl AreaLights<'_> {
                 let corners = [*center - *u - *v, *center + *u - *v, *center + *u + *v, *center - *u + *v];
                 figure(LightForm::Quad { corners, normal: *normal })
             }
-            Shape::Triangles(triangles) => figure(match quad_of(triangles) {
+            Shape::Triangles(of) => figure(match quad_of(of) {
                 Some((corners, normal)) => LightForm::Quad { corners, normal },
-                None => LightForm::Places(self.places_of(triangles, places.max(1))?),
+                None if of.corners.len() <= triangles.max(1) => {
+                    LightForm::Triangles(self.triangles_of(of, triangles.max(1)))
+                }
+                None => LightForm::Places(self.places_of(of, places.max(1))),
             }),
         }
+        .filter(|figure| match &figure.form {
+            LightForm::Triangles(triangles) => !triangles.is_empty(),
+            LightForm::Places(places) => !places.is_empty(),
+            _ => true,
+        })
     }
 
-    /// Places on triangles; `None` if none shines.
-    fn places_of(&self, triangles: &Triangles, most: usize) -> Option<Vec<LightPlace>> {
+    /// The triangles that shine, or like pieces of them, at most so many.
+    fn triangles_of(&self, triangles: &Triangles, most: usize) -> Vec<LightTriangle> {
         let count = triangles.corners.len();
-        let total = *triangles.weight.last()?;
-        let mut places = Vec::new();
-        if count <= most {
-            // Each is cut into a square number of like pieces, by its share of the power.
-            for i in 0..count {
-                let share = (triangles.own_weight(i) / total * (most - count) as f32) as usize + 1;
-                let side = (share as f32).sqrt() as usize;
-                for piece in 0..side * side {
-                    let corners = subtriangle(triangles.corners[i], side, piece);
-                    let radiance = triangles.mean_emission(self.scene, i, side, piece);
-                    places.extend(LightPlace::of(corners, 1.0, radiance));
-                }
-            }
-        } else {
-            for pick in 0..most {
-                let at = (pick as f32 + 0.5) / most as f32 * total;
-                let i = triangles.weight.partition_point(|sum| *sum <= at).min(count - 1);
-                let radiance = triangles.mean_emission(self.scene, i, 1, 0);
-                // So much of the light's surface shines as this triangle does.
-                let factor = total / (most as f32 * triangles.own_weight(i));
-                places.extend(LightPlace::of(triangles.corners[i], factor, radiance));
-            }
-        }
-        (!places.is_empty()).then_some(places)
+        let is_textured = triangles.textured.iter().any(Option::is_some);
+        let side =
+            if is_textured { (1..).take_while(|side| side * side * count <= most).last() } else { None };
+        let side = side.unwrap_or(1);
+        let pieces = (0..count).flat_map(|i| (0..side * side).map(move |piece| (i, piece)));
+        let triangle = |(i, piece): (usize, usize)| {
+            let radiance = triangles.mean_emission(self.scene, i, side, piece);
+            let corners = subtriangle(triangles.corners[i], side, piece);
+            (luminance(radiance) > 0.0 && radiance.is_finite()).then_some(LightTriangle { corners, radiance })
+        };
+        pieces.filter_map(triangle).collect()
+    }
+
+    /// Places on triangles, at most so many.
+    fn places_of(&self, triangles: &Triangles, most: usize) -> Vec<LightPlace> {
+        let Some(&total) = triangles.weight.last() else { return Vec::new() };
+        let count = triangles.corners.len();
+        let place = |pick: usize| {
+            let at = (pick as f32 + 0.5) / most as f32 * total;
+            let i = triangles.weight.partition_point(|sum| *sum <= at).min(count - 1);
+            let radiance = triangles.mean_emission(self.scene, i, 1, 0);
+            // So much of the light's surface shines as this triangle does.
+            let factor = total / (most as f32 * triangles.own_weight(i));
+            LightPlace::of(triangles.corners[i], factor, radiance)
+        };
+        (0..most).filter_map(place).collect()
     }
 }
 
@@ -148,6 +168,7 @@ impl LightForm {
                 (*center, *radius)
             }
             LightForm::Quad { corners, .. } => around(&mut corners.iter().copied()),
+            LightForm::Triangles(triangles) => around(&mut triangles.iter().flat_map(|t| t.corners)),
             LightForm::Places(places) => {
                 let (center, radius) = around(&mut places.iter().map(|place| place.position_world));
                 let widest = places.iter().map(|place| place.area_m2).fold(0.0, f32::max);

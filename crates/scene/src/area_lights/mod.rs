@@ -17,7 +17,7 @@ use glam::Vec3;
 
 pub use choose::{Chooser, Pick};
 pub use environment::{Environment, EnvironmentError, MAX_SIDE};
-pub use figure::{LightFigure, LightForm, LightPlace};
+pub use figure::{LightFigure, LightForm, LightPlace, LightTriangle};
 pub use shape::EmitterShape;
 
 use crate::{Pose, Scene};

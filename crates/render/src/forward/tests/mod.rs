@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
 mod agreement;
+mod area;
 mod atlas;
 mod harness;
 mod motion;

@@ -11,7 +11,7 @@ mod pages;
 mod resolve;
 mod sets;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod twin;
 mod upload;
 

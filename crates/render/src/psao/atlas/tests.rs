@@ -27,7 +27,7 @@ fn rest_positions(scene: &Scene, instance: usize) -> Vec<Vec3> {
 }
 
 /// Points on all surfaces, about one for each square of `spacing` / 1.1.
-fn lay(scene: &Scene, spacing: f32) -> Arc<PointLayout> {
+pub(crate) fn lay(scene: &Scene, spacing: f32) -> Arc<PointLayout> {
     let quantum = spacing / 32.0;
     let mut sets = Vec::new();
     for (index, instance) in scene.instances.iter().enumerate() {

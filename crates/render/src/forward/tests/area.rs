@@ -1,0 +1,182 @@
+//! Area lights on the card against the twin: every form, open and with what points see of them, and nothing at all without lights.
+
+use dapple_scene::area_lights::{AreaLights, EmitterShape};
+use dapple_scene::{Material, PosedCamera};
+use dapple_store::light_visibility::{LightVisibility, OPEN};
+use glam::{Affine3A, Vec3};
+
+use super::super::{AtlasBand, LookupId, View};
+use super::harness::{Bench, assert_agrees, inputs, save, twin};
+use crate::area_lights::{AreaLightTable, shade_area_lights};
+use crate::compose::compose;
+use crate::gbuffer::GBuffer;
+use crate::image::{Rgb8Image, ToneMap};
+use crate::psao::atlas::tests::lay;
+use crate::psao::atlas::{AtlasParams, VisibilityAtlas};
+use crate::shade::{ShadeParams, render_shadow_maps, shade, shading_points};
+use crate::testing::{Stage, cube, ground, matte, sphere, turned};
+
+const SIZE: (u32, u32) = (240, 160);
+
+/// Matte and glossy things under one light of each form, and two more so that lights need two groups.
+fn stage() -> Stage {
+    let mut stage = Stage::new();
+    let glossy = stage.add_material(Material { roughness_factor: 0.3, ..matte(Vec3::new(0.8, 0.5, 0.2)) });
+    let metal = stage.add_material(Material {
+        base_color_factor: glam::Vec4::new(0.9, 0.7, 0.4, 1.0),
+        roughness_factor: 0.5,
+        ..Material::default()
+    });
+    stage.add(ground(3.0), 0, Affine3A::IDENTITY);
+    stage.add(
+        sphere(24, 48),
+        glossy,
+        Affine3A::from_translation(Vec3::new(-0.9, 0.8, 0.2)) * Affine3A::from_scale(Vec3::splat(0.8)),
+    );
+    stage.add(cube(), metal, turned(0.7, Vec3::new(1.2, 0.7, -0.4)) * Affine3A::from_scale(Vec3::splat(0.5)));
+    // Mirrored, and with two sides.
+    let two_sided = stage.add_material(Material { double_sided: true, ..matte(Vec3::new(0.3, 0.6, 0.9)) });
+    let odd = Affine3A::from_scale(Vec3::new(-0.5, 0.6, 0.4));
+    stage.add(ground(1.0), two_sided, turned(0.9, Vec3::new(0.4, 0.8, 1.4)) * odd);
+    let down = |at: Vec3, scale: f32| {
+        Affine3A::from_translation(at)
+            * Affine3A::from_rotation_x(std::f32::consts::PI)
+            * Affine3A::from_scale(Vec3::splat(scale))
+    };
+    let small =
+        |at: Vec3, scale: f32| Affine3A::from_translation(at) * Affine3A::from_scale(Vec3::splat(scale));
+    for (mesh, emitter, world, radiance) in [
+        (
+            sphere(8, 12),
+            EmitterShape::Sphere,
+            small(Vec3::new(-2.0, 0.1, 1.6), 0.3),
+            Vec3::new(3.0, 1.5, 0.5),
+        ),
+        (ground(1.0), EmitterShape::Disc, down(Vec3::new(1.5, 2.6, 0.8), 0.3), Vec3::new(0.5, 2.0, 3.0)),
+        (ground(1.0), EmitterShape::Rectangle, down(Vec3::new(-1.0, 2.8, -1.0), 0.5), Vec3::splat(2.0)),
+        (cube(), EmitterShape::Triangles, small(Vec3::new(2.3, 0.2, 1.8), 0.2), Vec3::new(4.0, 0.4, 2.0)),
+        (
+            sphere(5, 7),
+            EmitterShape::Triangles,
+            small(Vec3::new(-0.2, 0.2, 2.4), 0.2),
+            Vec3::new(0.5, 4.0, 1.0),
+        ),
+        (
+            ground(1.0),
+            EmitterShape::Triangles,
+            down(Vec3::new(0.3, 1.9, -2.0), 0.4),
+            Vec3::new(1.0, 1.0, 4.0),
+        ),
+    ] {
+        let material = stage.add_material(Material { emissive_factor: radiance, ..matte(Vec3::ZERO) });
+        let light = stage.add(mesh, material, world);
+        stage.scene.instances[light as usize].emitter = emitter;
+    }
+    stage
+}
+
+fn camera() -> PosedCamera {
+    PosedCamera::look_at(Vec3::new(1.5, 3.0, 5.0), Vec3::new(0.0, 0.5, 0.2), 0.8)
+}
+
+fn table(stage: &Stage) -> AreaLightTable {
+    AreaLightTable::new(&AreaLights::new(&stage.scene, &stage.pose))
+}
+
+fn dim() -> ShadeParams {
+    ShadeParams { sun_without_lights: false, ..ShadeParams::default() }
+}
+
+/// What the twins draw with area lights.
+fn lit_twin(stage: &Stage, params: &ShadeParams, atlas: Option<&VisibilityAtlas>) -> (Rgb8Image, GBuffer) {
+    let (scene, pose, camera) = (&stage.scene, &stage.pose, &camera());
+    let (_, gbuffer) = twin(scene, pose, camera, SIZE, params);
+    let mut shaded = shade(scene, pose, camera, &gbuffer, &render_shadow_maps(scene, pose, params), params);
+    let points = shading_points(scene, pose, camera, &gbuffer, params.specular);
+    let table = table(stage);
+    let reflected = shade_area_lights(&points, &table, |sample, row| match atlas {
+        Some(atlas) => atlas.look_up_lights(&gbuffer.samples()[sample], table.lights(), row),
+        None => row.fill(1.0),
+    });
+    shaded.direct.iter_mut().zip(reflected).for_each(|(direct, reflected)| *direct += reflected);
+    (compose(&shaded, &gbuffer, None).unwrap().to_rgb8(&ToneMap::default()), gbuffer)
+}
+
+fn draw(bench: &mut Bench, stage: &Stage, params: &ShadeParams, lookup: LookupId) -> Rgb8Image {
+    let views = [View::new(camera(), lookup)];
+    bench.draw(SIZE, &inputs(&stage.pose, params, &views))
+}
+
+#[test]
+fn every_form_of_light_is_lit_like_the_twin_and_none_changes_nothing() {
+    let stage = stage();
+    let Some(mut bench) = Bench::new(&stage.scene, 1, &[]) else { return };
+    for (name, params) in [("area-gloss", dim()), ("area-matte", ShadeParams { specular: false, ..dim() })] {
+        let before = draw(&mut bench, &stage, &params, LookupId::NONE);
+        bench.scene.set_area_lights(&bench.gpu, &table(&stage));
+        let card = draw(&mut bench, &stage, &params, LookupId::NONE);
+        let (twin, gbuffer) = lit_twin(&stage, &params, None);
+        assert_agrees(name, &card, &twin, &gbuffer);
+        bench.scene.set_area_lights(&bench.gpu, &AreaLightTable::default());
+        assert_eq!(draw(&mut bench, &stage, &params, LookupId::NONE), before);
+        assert_ne!(card, before);
+    }
+}
+
+#[test]
+fn lights_are_dimmed_by_what_points_see_of_them() {
+    let stage = stage();
+    let layout = lay(&stage.scene, 0.12);
+    let values = vec![255; layout.len()];
+    let mut atlas = VisibilityAtlas::new(layout.clone(), &stage.scene, None, AtlasParams::default());
+    while !atlas.work(&stage.scene, &values, usize::MAX).is_complete() {}
+    let lights = table(&stage).lights().len() as u32;
+    // Waves over the points, others for each light.
+    let planes: Vec<u8> = (0..lights)
+        .flat_map(|light| {
+            let wave = move |point: usize| libm::sinf(point as f32 * 0.002 * (light + 1) as f32) * 0.5 + 0.5;
+            (0..layout.len()).map(move |point| (wave(point) * f32::from(OPEN) + 0.5) as u8)
+        })
+        .collect();
+    atlas.resolve_lights(&LightVisibility::new(&layout, lights, planes).unwrap());
+    let Some(mut bench) = Bench::new(&stage.scene, 1, &[]) else { return };
+    for instance in atlas.take_ready() {
+        bench.scene.set_charts(&bench.gpu, instance, atlas.charts(instance).unwrap()).unwrap();
+        bench.scene.set_pages(&bench.gpu, instance, atlas.placements(instance)).unwrap();
+    }
+    let layers: Vec<_> = (0..atlas.layers()).map(|layer| atlas.texels(layer)).collect();
+    bench.scene.upload_atlas(&bench.gpu, atlas.side(), &layers, &[]).unwrap();
+    atlas.show_lights(table(&stage).lights());
+    let upload = |bench: &mut Bench, atlas: &mut VisibilityAtlas| {
+        let dirty = atlas.take_dirty_lights();
+        let bands =
+            dirty.iter().map(|b| AtlasBand { layer: b.layer, first_row: b.y.start, end_row: b.y.end });
+        let bands: Vec<AtlasBand> = bands.collect();
+        let groups: Vec<_> = atlas.light_texels().iter().map(Vec::as_slice).collect();
+        bench.scene.upload_lights(&bench.gpu, atlas.side(), &groups, &bands).unwrap();
+    };
+    upload(&mut bench, &mut atlas);
+    bench.scene.set_area_lights(&bench.gpu, &table(&stage));
+    let open = lit_twin(&stage, &dim(), None).0;
+    let (twin, gbuffer) = lit_twin(&stage, &dim(), Some(&atlas));
+    assert_agrees("area-dimmed", &draw(&mut bench, &stage, &dim(), LookupId::ATLAS), &twin, &gbuffer);
+    assert_ne!(open, twin);
+    // Only what changed is written, and it is all that changed.
+    let blocked = vec![0; layout.len() * lights as usize];
+    let mut changes = Vec::new();
+    let held = LightVisibility::new(&layout, lights, blocked).unwrap();
+    for index in
+        (0..held.values().len() as u32).filter(|index| index % layout.len() as u32 > layout.len() as u32 / 2)
+    {
+        let (light, point) = (index / layout.len() as u32, index % layout.len() as u32);
+        let wave = libm::sinf(point as f32 * 0.002 * (light + 1) as f32) * 0.5 + 0.5;
+        let old = (wave * f32::from(OPEN) + 0.5) as u8;
+        changes.push(dapple_store::light_visibility::LightChange { index, old, new: 0 });
+    }
+    atlas.apply_lights(&changes);
+    upload(&mut bench, &mut atlas);
+    let (twin, gbuffer) = lit_twin(&stage, &dim(), Some(&atlas));
+    let card = draw(&mut bench, &stage, &dim(), LookupId::ATLAS);
+    assert_agrees("area-changed", &card, &twin, &gbuffer);
+    save("area-changed", &card);
+}
