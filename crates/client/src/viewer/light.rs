@@ -188,6 +188,11 @@ impl Light {
         Ok(())
     }
 
+    /// Whether area lights are drawn, by what [`Light::upload_lights`] did last.
+    pub(super) fn is_lit(&self) -> bool {
+        self.is_lit
+    }
+
     /// Brings the area lights of a pose onto the card, and what changed of how much is seen of them; takes them off it if they are not
     /// `wanted`, or the stream says nothing of them. What fails is not tried again before another layout comes.
     pub(super) fn upload_lights(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene, pose: &Pose, wanted: bool) {

@@ -23,6 +23,7 @@ use dapple_render::forward::{
     Forward, FrameInputs, GpuPoints, GpuScene, GpuSceneOptions, LookupId, Rect, Transparency, View, ViewKind,
 };
 use dapple_render::screen_space::{ScreenKind, ScreenPasses};
+use dapple_render::shade::ShadeParams;
 use dapple_scene::{Edits, Pose, PosedCamera, Scene};
 use dapple_store::points::PointStore;
 use dapple_stream::{Applied, ReceiveError};
@@ -243,9 +244,15 @@ impl Viewer {
         };
         let points = self.points.as_ref().map(|points| &points.on_card);
         let views = views(options, size, *camera, points, &lookup);
+        // Where lights of the scene's own shine, none is made up.
+        let shade = &self.config.shade;
+        let shade = ShadeParams {
+            sun_without_lights: shade.sun_without_lights && !self.light.is_lit(),
+            ..*shade
+        };
         let inputs = FrameInputs {
             pose: &pose,
-            shade: &self.config.shade,
+            shade: &shade,
             tone_map: options.tone_map,
             transparency: self.transparency,
             fade: self.light.fade(now_s, options.fade_s),
