@@ -207,8 +207,8 @@ impl Viewer {
             self.paper.prepare(gpu, &mut self.forward, self.light.received.store());
         }
         let wants_points = options.view == DebugView::Points;
-        // Only where points are shown must the processor know where deforming meshes are.
-        let pose = if wants_points {
+        // Only where points are shown, or what deforms shines, must the processor know where deforming meshes are.
+        let pose = if wants_points || options.area_lights && self.light.lights_deform() {
             self.scene.pose_edited(scene_time_s, &self.edits)
         } else {
             self.scene.pose_undeformed_edited(scene_time_s, &self.edits)
@@ -246,10 +246,8 @@ impl Viewer {
         let views = views(options, size, *camera, points, &lookup);
         // Where lights of the scene's own shine, none is made up.
         let shade = &self.config.shade;
-        let shade = ShadeParams {
-            sun_without_lights: shade.sun_without_lights && !self.light.is_lit(),
-            ..*shade
-        };
+        let shade =
+            ShadeParams { sun_without_lights: shade.sun_without_lights && !self.light.is_lit(), ..*shade };
         let inputs = FrameInputs {
             pose: &pose,
             shade: &shade,
@@ -299,7 +297,8 @@ impl Viewer {
     /// Why a look-up that was drawn with cannot show the points that there are: too many for the device or for the look-up's
     /// structure; or why the device cannot run a screen-space method. `None` if all is well.
     pub fn problem(&self) -> Option<&str> {
-        self.light.problem().or(self.paper.problem()).or(self.screen.problem())
+        let of_points = self.light.problem().or(self.paper.problem());
+        of_points.or(self.screen.problem()).or(self.light.lights_problem())
     }
 
     /// Figures for an overlay. Looks at all that is held: a few times a second is enough.
