@@ -184,7 +184,8 @@ fn what_goes_on_changing_does_not_keep_the_rest_waiting() {
     let mut frames = 0u32;
     while ends.values()[2 * points..] != values[2 * points..] {
         for (point, value) in values[..points].iter_mut().enumerate() {
-            *value = ((point as u32).wrapping_mul(2_654_435_761).wrapping_add(frames * 7919) >> 20) as u8 & OPEN;
+            *value =
+                ((point as u32).wrapping_mul(2_654_435_761).wrapping_add(frames * 7919) >> 20) as u8 & OPEN;
         }
         let spending = Spending { most_bytes: Some(200), ..Spending::default() };
         let bytes = ends.publish(&store(&layout, 3, values.clone()), &spending);
