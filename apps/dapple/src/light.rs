@@ -1,6 +1,7 @@
 //! The server's settings from the command line, and the recording of what it sends.
 
 use anyhow::{Context, Result, bail};
+use dapple_render::area_lights::MAX_AREA_LIGHTS;
 use dapple_scene::Scene;
 use dapple_scene::area_lights::AreaLights;
 use dapple_server::{BENT_PRECISION, Progress, Server, ServerConfig};
@@ -10,6 +11,7 @@ use dapple_trace::psao::update::{StepInput, UpdateParams};
 use dapple_trace::slc::TrackerParams;
 
 use crate::args::{LightArgs, VisibilityArgs};
+use crate::direct_light::warn_of_lights;
 use crate::progress::Bar;
 use crate::source::{self, Loaded};
 
@@ -59,10 +61,16 @@ fn area_lights(scene: &Scene, wanted: bool) -> Option<TrackerParams> {
     }
     let lights = AreaLights::new(scene, &scene.pose(0.0));
     if lights.is_empty() {
-        tracing::warn!("--area-lights: nothing in this scene emits, so there are none");
+        tracing::warn!(
+            "--area-lights: nothing in this scene emits, so there are none: give a material an emissive factor, or leave it out"
+        );
     }
-    if lights.left_out() > 0 {
-        tracing::warn!("--area-lights: {} meshes emit but have too many triangles to be lights", lights.left_out());
+    warn_of_lights(&lights);
+    if lights.len() > MAX_AREA_LIGHTS {
+        tracing::warn!(
+            "--area-lights: of {} lights viewers show the {MAX_AREA_LIGHTS} most powerful",
+            lights.len()
+        );
     }
     Some(TrackerParams::default())
 }

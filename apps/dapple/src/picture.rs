@@ -5,9 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use dapple_client::Drawn;
 use dapple_metrics::{MetricError, flip, flip_hdr, magma_srgb8, psnr, psnr_masked, ssim};
-use dapple_render::compose::{
-    ErrorKind, ResolvedPlane, compose, resolve_plane, view_error, view_visibility,
-};
+use dapple_render::compose::{ErrorKind, ResolvedPlane, compose, resolve_plane, view_error, view_visibility};
 use dapple_render::image::{Rgb8Image, ToneMap};
 use dapple_render::shade::Shaded;
 use dapple_scene::Scene;

@@ -243,7 +243,10 @@ fn complete(atlas: &mut VisibilityAtlas, scene: &Scene, store: &PointStore) {
     if let Some(bent) = store.bent() {
         atlas.resolve_bent(bent);
     }
-    if let Some(lights) = store.lights() {
+    // Values of other lights than the scene's tell nothing, and could be of any number of them.
+    if let Some(lights) = store.lights()
+        && lights.lights() as usize == AreaLights::new(scene, &scene.pose_undeformed(0.0)).len()
+    {
         atlas.resolve_lights(lights);
     }
 }

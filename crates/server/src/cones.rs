@@ -7,11 +7,10 @@
 use std::sync::Arc;
 
 use dapple_scene::area_lights::{AreaLights, Environment};
-use dapple_scene::glam::Vec3;
 use dapple_scene::{Pose, Scene};
 use dapple_store::charts::{ChartParams, ChartSet, InstanceKey, SceneCharts};
 use dapple_store::cones::{
-    CacheParams, Charting, ConeCache, ConeError, EntryId, LookUp, Requests, UpdateQueue, View,
+    CacheParams, Charting, ConeCache, ConeError, EntryId, EntrySite, LookUp, Requests, UpdateQueue, View,
 };
 use dapple_trace::Tracer;
 use dapple_trace::slc::{Changes, EntryPlaces, Moment, SlcCounts, Update};
@@ -149,9 +148,13 @@ impl<E: Update> ConeServer<E> {
         &self.cache
     }
 
-    /// Position and unit normal, in the world, of an entry that was wanted in the last step.
+    /// Where in the world an entry is that was wanted in the last step.
     #[inline]
-    pub fn place_of(&self, id: EntryId) -> Option<(Vec3, Vec3)> {
-        self.places.of_entry(id).map(|place| (place.position_world, place.normal_world))
+    pub fn place_of(&self, id: EntryId) -> Option<EntrySite> {
+        self.places.of_entry(id).map(|place| EntrySite {
+            position_world: place.position_world,
+            normal_world: place.normal_world,
+            normal_shading_world: place.normal_shading_world,
+        })
     }
 }

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use dapple_scene::area_lights::AreaLights;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Edits, Pose, Scene};
-use dapple_store::light_visibility::LightVisibilityError;
+use dapple_store::light_visibility::{LightVisibility, LightVisibilityError};
 use dapple_store::points::{LayoutError, PointStore};
 use dapple_stream::{Budget, Frame, Precision, Publisher, PublisherConfig};
 use dapple_trace::Tracer;
@@ -78,6 +78,11 @@ impl ServerConfig {
             }
             Some(_) if self.generate.adaptive > 0.0 => return Err(ServerError::AdaptiveCap),
             Some(_) => drop(PointLayer::new(scene, &self.generate)?),
+        }
+        if let (Some(_), Some(points)) = (self.lights, self.max_resident_points) {
+            // As many as there can be at a time; without a cap their number is not known yet.
+            let lights = AreaLights::new(scene, &scene.pose_undeformed(0.0)).len() as u32;
+            LightVisibility::check(points as usize, lights)?;
         }
         Ok(self.update.check()?)
     }
@@ -180,7 +185,7 @@ pub struct StepReport {
     pub counts: StepCounts,
     /// Points whose published visibility changed.
     pub changed: u32,
-    /// Points that subscribers hold less exactly than they should, because the budget of bits did not reach.
+    /// Points, and values of lights, that subscribers hold less exactly than they should, because the budget of bits did not reach.
     pub held_back: u32,
     /// Points that there are, those that wait for their first rays counted.
     pub points: u32,
@@ -333,7 +338,9 @@ impl Server {
         }
         // Lights get what ambient light leaves, and where that was not enough, a part of their own.
         let for_lights = match (&self.lights, input.ray_budget) {
-            (Some(lights), Some(budget)) if lights.due() > 0 => budget / LIGHTS_PART,
+            (Some(lights), Some(budget)) if lights.due() > 0 => {
+                (budget / LIGHTS_PART).min(lights.due() as u64 * u64::from(lights.rays()))
+            }
             _ => 0,
         };
         let ambient = StepInput { ray_budget: input.ray_budget.map(|rays| rays - for_lights), ..*input };
@@ -397,7 +404,22 @@ impl Server {
             return 0;
         }
         let pairs = self.store().visibility().iter().zip(self.traced().visibility());
-        pairs.filter(|(held, traced)| held.abs_diff(**traced) > self.tolerance).count() as u32
+        let points = pairs.filter(|(held, traced)| held.abs_diff(**traced) > self.tolerance).count();
+        (points + self.lights_held_back()) as u32
+    }
+
+    /// Values of lights that subscribers hold less exactly than they should.
+    fn lights_held_back(&self) -> usize {
+        let Some((lights, held)) = self.lights.as_ref().zip(self.store().lights()) else { return 0 };
+        let traced = lights.values();
+        if held.points() != traced.points() {
+            return 0;
+        }
+        let is_off = |&(index, steps): &(u32, u8)| {
+            let index = index as usize;
+            held.values()[index].abs_diff(traced.values()[index]) > steps
+        };
+        lights.tolerances(held, &self.scene, &self.pose).iter().filter(|listed| is_off(listed)).count()
     }
 
     /// The snapshot that brings a subscriber that joins now up to date. Encoded at most once an update.
@@ -462,8 +484,9 @@ const LIGHTS_PART: u64 = 3;
 fn lit(updater: &Updater, lights: Option<&LightTracker>) -> PointStore {
     let store = updater.store().clone();
     match lights {
-        // Both are of the same points: the tracker follows those that come and go before anything is published.
-        Some(lights) => store.clone().with_lights(lights.values().clone()).unwrap_or(store),
+        Some(lights) => store
+            .with_lights(lights.values().clone())
+            .expect("the tracker follows points that come and go before anything is published"),
         None => store,
     }
 }

@@ -60,7 +60,7 @@ fn row(views: &[Vec<Option<PixelPlace>>], threads: usize, look_up: LookUp) {
             // One sample of one of four lights.
             let light = (i as u32 + queued.samples as u32) % 4;
             let direction = Vec3::new(light as f32 - 1.5, 2.0, (i % 7) as f32 * 0.1).normalize();
-            entry.update(&[ConeSample { direction, value: Vec3::ONE, light }], 1, &params);
+            entry.update(&[ConeSample { direction, value: Vec3::ONE, light, cosine: 1.0 }], 1, &params);
             true
         })
     });
@@ -155,7 +155,7 @@ impl Hall {
             let (triangle, barycentrics) = if a >= b { (0, [a - b, b]) } else { (1, [a, b - a]) };
             let place = self.charting.place(instance, triangle, barycentrics, Vec3::ZERO, Vec3::Y)?;
             let footprint_m = distance * ray.length() * 2.0 / WIDTH as f32;
-            Some(PixelPlace { instance, triangle, barycentrics, place, footprint_m })
+            Some(PixelPlace { instance, triangle, barycentrics, place, footprint_m, lean: [0.0; 2] })
         };
         (0..WIDTH * ROWS).into_par_iter().map(pixel).collect()
     }

@@ -44,7 +44,7 @@ use dapple_store::points::LayoutError;
 pub(crate) const MAX_LOCAL_BITS: u32 = 8;
 
 /// What a receiver is willing to take. Every allocation of a decoder is bounded by these, whatever the bytes say:
-/// at most 64 bytes for each of `max_points`, 256 for each of `max_sets`, 32 for each of `max_cuts`, 16 for each of `max_light_values`, and 8 MiB.
+/// at most 64 bytes for each of `max_points`, 256 for each of `max_sets`, 32 for each of `max_cuts`, 40 for each of `max_light_values`, and 8 MiB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Longest frame, bytes. Default 64 MiB.
@@ -56,8 +56,8 @@ pub struct Limits {
     pub max_sets: u32,
     /// Most texels of which points are cut. Default 2²¹ (2 million; a building of 4 million points has about a tenth).
     pub max_cuts: u32,
-    /// Most values of lights, points × lights. Default 2²³ (8 million; each a byte); at most
-    /// [`MAX_VALUES`](dapple_store::light_visibility::MAX_VALUES) has an effect.
+    /// Most values of lights: points, or sets if they are more, × lights. Default
+    /// [`MAX_VALUES`](dapple_store::light_visibility::MAX_VALUES), 2²⁴, and no more than that has an effect.
     pub max_light_values: u32,
 }
 
@@ -68,7 +68,7 @@ impl Default for Limits {
             max_points: 1 << 22,
             max_sets: 1 << 16,
             max_cuts: 1 << 21,
-            max_light_values: 1 << 23,
+            max_light_values: dapple_store::light_visibility::MAX_VALUES as u32,
         }
     }
 }

@@ -172,3 +172,26 @@ fn parts_put_together_have_the_lights_of_each() {
     assert!(error.contains("values of 3 lights do not go with others that have 2"), "{error}");
     assert_eq!(parts.store().unwrap().lights(), Some(&whole));
 }
+
+/// One light changes everywhere in each frame, and does not fit; the shadow of another has moved once.
+#[test]
+fn what_goes_on_changing_does_not_keep_the_rest_waiting() {
+    let layout = floor(0, 24);
+    let points = layout.len();
+    let mut values = vec![OPEN; 3 * points];
+    let (mut ends, _) = Ends::new(&store(&layout, 3, values.clone()));
+    values[2 * points..].fill(3);
+    let mut frames = 0u32;
+    while ends.values()[2 * points..] != values[2 * points..] {
+        for (point, value) in values[..points].iter_mut().enumerate() {
+            *value =
+                ((point as u32).wrapping_mul(2_654_435_761).wrapping_add(frames * 7919) >> 20) as u8 & OPEN;
+        }
+        let spending = Spending { most_bytes: Some(200), ..Spending::default() };
+        let bytes = ends.publish(&store(&layout, 3, values.clone()), &spending);
+        assert!(bytes > 0 && bytes <= 200, "{bytes}");
+        frames += 1;
+        assert!(frames < 400, "it waits for ever");
+    }
+    assert!(frames > 1);
+}

@@ -66,7 +66,8 @@ pub(crate) enum Method {
 impl Method {
     /// Whether it depends on points and server rate.
     pub(crate) fn uses_points(self) -> bool {
-        matches!(self, Method::Psao | Method::Slc | Method::PsaoMls | Method::PsaoHat { .. }) || self.is_paper()
+        matches!(self, Method::Psao | Method::Slc | Method::PsaoMls | Method::PsaoHat { .. })
+            || self.is_paper()
     }
 
     /// Whether its server and its stream are the paper's.

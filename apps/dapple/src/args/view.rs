@@ -16,6 +16,7 @@ pub(crate) const VIEW_EXAMPLES: &str = "\
 Examples:
   dapple view room.glb                           lights the room while you walk through it
   dapple view --builtin atrium --detail 0.5 --points 256 --hz 5
+  dapple view --builtin street --area-lights     soft shadows of whatever emits
   dapple view room.glb --stream room.dapple      plays a recording (dapple record)
   dapple view --url http://127.0.0.1:8000/       what a page there shows (dapple demo), or a live session (dapple serve)
   dapple view room.glb --camera walk.json        along a camera path that was recorded (R) or written by hand
@@ -47,6 +48,10 @@ pub(crate) struct ViewArgs {
     /// Server updates a second [default: 15].
     #[arg(long, value_name = "H", allow_hyphen_values = true)]
     pub(crate) hz: Option<f64>,
+    /// Draw soft shadows of whatever emits: points say how much of each light they see. What plays a stream or a page draws them where the stream has them. L turns
+    /// them off and on.
+    #[arg(long, conflicts_with_all = ["stream", "url"])]
+    pub(crate) area_lights: bool,
     #[command(flatten)]
     pub(crate) visibility: VisibilityArgs,
     #[command(flatten)]

@@ -239,13 +239,22 @@ impl Lighter {
             }
             Lighter::Paper(of) => {
                 let (server, params, look_up) = &mut **of;
-                let shading =
-                    SlcShading { look_up: *look_up, form: Form::Fluence, samples: Samples::Fixed(16) };
+                let shading = SlcShading {
+                    look_up: *look_up,
+                    form: Form::Fluence,
+                    samples: Samples::Fixed(16),
+                    ..SlcShading::default()
+                };
                 with_cones(server, now, seen, charting, params, &shading, pass)
             }
             Lighter::Cones(of) => {
                 let (server, params, look_up, samples) = &mut **of;
-                let shading = SlcShading { look_up: *look_up, form: Form::Ratio, samples: *samples };
+                let shading = SlcShading {
+                    look_up: *look_up,
+                    form: Form::Ratio,
+                    samples: *samples,
+                    ..SlcShading::default()
+                };
                 with_cones(server, now, seen, charting, params, &shading, pass)
             }
         }
@@ -319,7 +328,7 @@ fn with_cones<E: Update + Caps>(
 ) -> (Vec<Vec<Vec3>>, Cost) {
     let pixels: Vec<_> = seen
         .iter()
-        .map(|seen| pixel_places(now.scene, now.pose, &seen.camera, &seen.gbuffer, charting))
+        .map(|seen| pixel_places(now.scene, now.pose, &seen.camera, &seen.gbuffer, &seen.points, charting))
         .collect();
     pass("texels");
     let views: Vec<View<'_>> = seen

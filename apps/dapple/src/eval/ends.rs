@@ -168,7 +168,8 @@ impl AnyServer {
                 let report = server.step_at(time_s, sent_s, input)?;
                 let step = AnyStep::new(report.frame.map(|frame| frame.bytes), report.counts);
                 let sets = Some([report.points, report.spawned, report.evicted]);
-                Ok(AnyStep { held_back: report.held_back, sets, ..step })
+                let held_back = report.held_back.saturating_add(report.lights_due as u32);
+                Ok(AnyStep { held_back, sets, rays: report.rays, ..step })
             }
             AnyServer::Paper(server) => {
                 let size = stage.settings.size;
@@ -189,6 +190,14 @@ impl AnyServer {
                     sets: None,
                 })
             }
+        }
+    }
+
+    /// Rays to lights that the start took.
+    pub(super) fn first_light_rays(&self) -> u64 {
+        match self {
+            AnyServer::Own(server) => server.lights().map_or(0, |lights| lights.first_counts().rays),
+            _ => 0,
         }
     }
 

@@ -302,7 +302,9 @@ impl Line {
                 // Other places than the truth's.
                 let params = DirectParams {
                     samples: stage.settings.rays_per_sample(rays),
-                    seed: u64::from(stage.settings.seed) << 8 | 1,
+                    seed: ((frame.time_s * CLIENT_HZ).round() as u64) << 40
+                        | u64::from(stage.settings.seed) << 8
+                        | 1,
                     ..DirectParams::default()
                 };
                 let (reflected, counts) = stage.traced_light(&frame.drawn, &params);

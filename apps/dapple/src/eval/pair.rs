@@ -211,7 +211,7 @@ impl Pair {
             recording = Some(Recording { recorder, bytes, duration_us });
         }
         let points = server.points();
-        let rays = points * u64::from(stage.settings.point_rays);
+        let rays = points * u64::from(stage.settings.point_rays) + server.first_light_rays();
         Ok(Pair {
             client,
             points_per_m2,

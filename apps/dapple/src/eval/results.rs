@@ -297,8 +297,18 @@ pub(crate) struct StudyResult {
     pub(crate) notes: Vec<String>,
     pub(crate) tables: Vec<StudyTable>,
     pub(crate) plots: Vec<StudyPlot>,
+    #[serde(default)]
+    pub(crate) pictures: Vec<StudyPicture>,
     /// Where times were taken.
     pub(crate) machine: Machine,
+}
+
+/// A picture that shows what the numbers say.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct StudyPicture {
+    pub(crate) title: String,
+    /// Relative to the results file.
+    pub(crate) file: String,
 }
 
 /// Numbers with names.

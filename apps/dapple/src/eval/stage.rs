@@ -210,8 +210,7 @@ impl<'a> Stage<'a> {
             };
             self.traced_light(&drawn, &params).0
         });
-        let truth =
-            Shown::lit(&drawn, ambient.as_deref(), reflected.as_deref(), Some(&traced.visibility))?;
+        let truth = Shown::lit(&drawn, ambient.as_deref(), reflected.as_deref(), Some(&traced.visibility))?;
         // What the client shows first may be a step old: what moved since then is no flicker when it arrives.
         let before =
             (1..=self.client_frames_a_step().min(MAX_WATCHED)).map(|k| time_s - f64::from(k) / CLIENT_HZ);
@@ -231,7 +230,8 @@ impl<'a> Stage<'a> {
         let counts = trace_direct(&self.tracer_at(drawn), &lights, &points, params, &mut radiance);
         // What surfaces emit is drawn already.
         for (radiance, point) in radiance.iter_mut().zip(&points) {
-            *radiance = point.as_ref().map_or(Vec3::ZERO, |point| (*radiance - point.emitted).max(Vec3::ZERO));
+            *radiance =
+                point.as_ref().map_or(Vec3::ZERO, |point| (*radiance - point.emitted).max(Vec3::ZERO));
         }
         (radiance, counts.rays)
     }

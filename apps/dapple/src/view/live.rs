@@ -240,7 +240,10 @@ fn run(
                 let report = server.step_at(time_s, began.elapsed().as_secs_f64(), &input)?;
                 let (seconds, busy) = (
                     start.elapsed().as_secs_f64(),
-                    report.frame.is_some() || report.rays > 0 || report.held_back > 0,
+                    report.frame.is_some()
+                        || report.rays > 0
+                        || report.held_back > 0
+                        || report.lights_due > 0,
                 );
                 let stepped = Reply::Stepped { seconds, traced: report.traced, busy };
                 if let Some(frame) = report.frame {

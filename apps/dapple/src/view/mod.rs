@@ -116,6 +116,7 @@ fn open(args: &ViewArgs) -> Result<Opening> {
         preset: None,
         points: Some(quality.points_per_m2),
         hz: Some(args.hz.unwrap_or(DEFAULT_HZ)),
+        area_lights: args.area_lights,
         visibility: args.visibility.clone(),
         step: args.step,
     };

@@ -25,6 +25,7 @@ pub(super) const KEYS: [(&str, &str); 17] = [
     ("Space", "pause, go on"),
     ("Left, Right, Home", "one update back or ahead, the beginning"),
     ("M", "next method"),
+    ("L", "area lights on and off"),
     ("B", "split screen; drag the line"),
     ("V, 1 to 8", "next view; that view"),
     ("F12, P", "screenshot without this overlay"),

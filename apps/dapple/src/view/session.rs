@@ -299,6 +299,7 @@ impl Session {
             }
             KeyCode::KeyR => self.toggle_recording(now_s),
             KeyCode::KeyM => show.options.method = next_of(&Method::ALL, show.options.method),
+            KeyCode::KeyL => show.options.area_lights = !show.options.area_lights,
             KeyCode::KeyB => {
                 show.options.split = match show.options.split {
                     None => Some((0.5, Method::None)),

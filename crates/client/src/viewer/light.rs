@@ -21,6 +21,9 @@ pub(super) struct Light {
     pub(super) received: Received,
     pub(super) atlas: Option<VisibilityAtlas>,
     pub(super) inspection: Inspection,
+    /// Lights that the scene has, and whether any of them is skinned or morphs.
+    scene_lights: u32,
+    do_lights_deform: bool,
     /// Lights whose visibility the atlas has.
     lights: u32,
     /// Whether area lights lie on the card.
@@ -33,12 +36,26 @@ pub(super) struct Light {
     paces: BTreeMap<Option<u8>, Pace>,
     /// Why this atlas cannot be shown.
     problem: Option<String>,
+    /// Why its lights cannot.
+    lights_problem: Option<String>,
 }
 
 impl Light {
     pub(super) fn new(scene: Arc<Scene>, received: Received) -> Light {
         let inspection = Inspection::default();
+        let (scene_lights, do_lights_deform) = {
+            let lights = AreaLights::new(&scene, &scene.pose_undeformed(0.0));
+            let deforms = |instance: u32| {
+                let instance = &scene.instances[instance as usize];
+                instance.skin.is_some() || !scene.meshes[instance.mesh as usize].morph_targets.is_empty()
+            };
+            let deform = (0..lights.len()).filter_map(|light| lights.instance(light)).any(deforms);
+            (lights.len() as u32, deform)
+        };
         Light {
+            scene_lights,
+            do_lights_deform,
+            lights_problem: None,
             scene,
             received,
             atlas: None,
@@ -64,7 +81,7 @@ impl Light {
         match &applied {
             Applied::NewLayout => {
                 self.is_new = true;
-                self.problem = None;
+                (self.problem, self.lights_problem) = (None, None);
                 self.inspection.reset();
                 let cuts = self.received.cuts();
                 self.atlas = self.received.store().map(|store| {
@@ -74,7 +91,7 @@ impl Light {
             Applied::Sets { removed, changes, .. } => {
                 self.inspection.forget_shown();
                 // There may be room now.
-                self.problem = None;
+                (self.problem, self.lights_problem) = (None, None);
                 if let (Some(atlas), Some(store)) = (&mut self.atlas, self.received.store()) {
                     let cuts = self.received.cuts();
                     atlas.change_sets(&self.scene, store.layout().clone(), cuts, removed);
@@ -91,7 +108,8 @@ impl Light {
     /// Takes over what a frame changed of the visibility of lights; of instances that become ready [`Light::work`] takes it in.
     fn take_lights(&mut self, applied: &Applied) {
         let (Some(atlas), Some(store)) = (&mut self.atlas, self.received.store()) else { return };
-        let lights = store.lights();
+        // Values of other lights than the scene's tell nothing, and could be of any number of them.
+        let lights = store.lights().filter(|lights| lights.lights() == self.scene_lights);
         let count = lights.map_or(0, |lights| lights.lights());
         if std::mem::replace(&mut self.lights, count) != count {
             // Others than before: what was taken in is of no use.
@@ -128,7 +146,7 @@ impl Light {
         let before = atlas.ready_count();
         let progress = atlas.work(&self.scene, store.visibility(), texels);
         if atlas.ready_count() > before {
-            if let Some(lights) = store.lights() {
+            if let Some(lights) = store.lights().filter(|_| self.lights > 0) {
                 atlas.resolve_lights(lights);
             }
             // All texels share one fade: it begins anew, for the others from what they show.
@@ -154,6 +172,11 @@ impl Light {
     /// Why the atlas cannot be shown, if so: until there is another one.
     pub(super) fn problem(&self) -> Option<&str> {
         self.problem.as_deref()
+    }
+
+    /// Why area lights cannot be shown, if so: until there are other points.
+    pub(super) fn lights_problem(&self) -> Option<&str> {
+        self.lights_problem.as_deref()
     }
 
     /// Brings onto the card what changed since the last call. What fails is not tried again before another layout comes.
@@ -188,10 +211,21 @@ impl Light {
         Ok(())
     }
 
+    /// Whether lights whose visibility is held change their shape.
+    pub(super) fn lights_deform(&self) -> bool {
+        self.lights > 0 && self.do_lights_deform
+    }
+
+    /// Whether area lights are drawn, by what [`Light::upload_lights`] did last.
+    pub(super) fn is_lit(&self) -> bool {
+        self.is_lit
+    }
+
     /// Brings the area lights of a pose onto the card, and what changed of how much is seen of them; takes them off it if they are not
     /// `wanted`, or the stream says nothing of them. What fails is not tried again before another layout comes.
     pub(super) fn upload_lights(&mut self, gpu: &Gpu, gpu_scene: &mut GpuScene, pose: &Pose, wanted: bool) {
-        let is_lit = wanted && self.lights > 0 && self.problem.is_none();
+        let is_fine = self.problem.is_none() && self.lights_problem.is_none();
+        let is_lit = wanted && self.lights > 0 && is_fine;
         if !is_lit && self.is_lit {
             gpu_scene.set_area_lights(gpu, &AreaLightTable::default());
         }
@@ -203,7 +237,7 @@ impl Light {
         if !bands.is_empty() {
             let groups: Vec<_> = atlas.light_texels().iter().map(Vec::as_slice).collect();
             let uploaded = gpu_scene.upload_lights(gpu, atlas.side(), &groups, &bands);
-            self.problem = uploaded.err().map(|error| error.to_string());
+            self.lights_problem = uploaded.err().map(|error| format!("area lights: {error}"));
         }
         gpu_scene.set_area_lights(gpu, &table);
     }

@@ -23,6 +23,7 @@ use dapple_render::forward::{
     Forward, FrameInputs, GpuPoints, GpuScene, GpuSceneOptions, LookupId, Rect, Transparency, View, ViewKind,
 };
 use dapple_render::screen_space::{ScreenKind, ScreenPasses};
+use dapple_render::shade::ShadeParams;
 use dapple_scene::{Edits, Pose, PosedCamera, Scene};
 use dapple_store::points::PointStore;
 use dapple_stream::{Applied, ReceiveError};
@@ -206,8 +207,8 @@ impl Viewer {
             self.paper.prepare(gpu, &mut self.forward, self.light.received.store());
         }
         let wants_points = options.view == DebugView::Points;
-        // Only where points are shown must the processor know where deforming meshes are.
-        let pose = if wants_points {
+        // Only where points are shown, or what deforms shines, must the processor know where deforming meshes are.
+        let pose = if wants_points || options.area_lights && self.light.lights_deform() {
             self.scene.pose_edited(scene_time_s, &self.edits)
         } else {
             self.scene.pose_undeformed_edited(scene_time_s, &self.edits)
@@ -243,9 +244,13 @@ impl Viewer {
         };
         let points = self.points.as_ref().map(|points| &points.on_card);
         let views = views(options, size, *camera, points, &lookup);
+        // Where lights of the scene's own shine, none is made up.
+        let shade = &self.config.shade;
+        let shade =
+            ShadeParams { sun_without_lights: shade.sun_without_lights && !self.light.is_lit(), ..*shade };
         let inputs = FrameInputs {
             pose: &pose,
-            shade: &self.config.shade,
+            shade: &shade,
             tone_map: options.tone_map,
             transparency: self.transparency,
             fade: self.light.fade(now_s, options.fade_s),
@@ -292,7 +297,8 @@ impl Viewer {
     /// Why a look-up that was drawn with cannot show the points that there are: too many for the device or for the look-up's
     /// structure; or why the device cannot run a screen-space method. `None` if all is well.
     pub fn problem(&self) -> Option<&str> {
-        self.light.problem().or(self.paper.problem()).or(self.screen.problem())
+        let of_points = self.light.problem().or(self.paper.problem());
+        of_points.or(self.screen.problem()).or(self.light.lights_problem())
     }
 
     /// Figures for an overlay. Looks at all that is held: a few times a second is enough.

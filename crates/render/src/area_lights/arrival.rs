@@ -1,6 +1,6 @@
 //! What arrives of one light at one place with nothing in the way: irradiance by its form, and the cone that it comes from.
 //!
-//! The twin of `area_lights.wgsl`; equations in `README.md`.
+//! The twin of `arrival.wgsl`; equations in `README.md`.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 

@@ -7,6 +7,7 @@
 //! No ray is traced. Equations, parameters and failure cases in `README.md`.
 
 mod arrival;
+mod gloss;
 #[cfg(feature = "gpu")]
 pub(crate) mod table;
 #[cfg(test)]
@@ -18,8 +19,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 pub use arrival::Arrival;
-
-use crate::slc::cap::{Cap, Lens};
+use gloss::Surface;
 
 /// Most lights that are shown.
 pub const MAX_AREA_LIGHTS: usize = 64;
@@ -119,15 +119,15 @@ fn reflect_one(point: &ShadingPoint, table: &AreaLightTable, fractions: &[f32]) 
     if r.diffuse == Vec3::ZERO && (r.f0 == Vec3::ZERO || !r.specular) {
         return Vec3::ZERO;
     }
-    let lens = Lens::of(point);
+    let surface = Surface::of(point);
     let mut sum = Vec3::ZERO;
     for (slot, &fraction) in fractions.iter().enumerate() {
         if fraction <= 0.0 {
             continue;
         }
         let arrival = table.arrival(slot, point.position_world, point.normal_shading_world);
-        let Some(Arrival { irradiance, direction, cos_angle }) = arrival else { continue };
-        sum += lens.shade_evenly(&Cap { direction, cos_angle, energy: irradiance * fraction });
+        let Some(arrival) = arrival else { continue };
+        sum += surface.reflect(&arrival) * fraction;
     }
     sum
 }

@@ -97,6 +97,21 @@ impl GBuffer {
         Some(blend(corners, Found::new(scene, sample)?.weights))
     }
 
+    /// Parts of a vector along the first edge of the posed triangle that a sample sees, and in its plane across that (towards the third
+    /// corner); `None` as in [`GBuffer::surface`], and where the triangle has collapsed.
+    pub(crate) fn lean(
+        &self,
+        scene: &Scene,
+        pose: &Pose,
+        sample_index: usize,
+        vector_world: Vec3,
+    ) -> Option<[f32; 2]> {
+        let sample = self.samples.get(sample_index).filter(|s| s.is_covered())?;
+        let corners = world_triangle(scene, pose, sample.instance as usize, sample.triangle as usize)?;
+        let frame = frame(&corners, false)?;
+        Some([frame.x_axis.dot(vector_world), frame.y_axis.dot(vector_world)])
+    }
+
     /// Rest position and normal of the surface that a sample sees; `None` as in [`GBuffer::surface`].
     pub fn surface_rest(&self, scene: &Scene, sample_index: usize) -> Option<RestSurface> {
         let sample = self.samples.get(sample_index).filter(|s| s.is_covered())?;

@@ -1,6 +1,4 @@
-//! Light of one cone, reflected: a fixed pattern of directions in it, and glTF's reflectance in lanes.
-//!
-//! Also what area lights are shaded with ([`crate::area_lights`]).
+//! Light of cones, reflected: a fixed pattern of directions in each, and glTF's reflectance in lanes, of several cones at once.
 
 use std::f32::consts::FRAC_1_PI;
 use std::sync::LazyLock;
@@ -20,12 +18,16 @@ pub struct Cap {
     pub cos_angle: f32,
     /// What arrives through it, W/m².
     pub energy: Vec3,
+    /// Energy ÷ fluence, above 0 and up to 1: with irradiance, the mean cosine of the light at the entry.
+    pub mean_cosine: f32,
 }
 
 /// What an entry's energies are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Form {
-    /// Irradiance on the entry's surface: L = Σ E · Σ f cos / Σ cos'. Diffuse light is exact for any shape of cone.
+    /// Irradiance E on the entry's surface with mean cosine c: L = Σ E · (Σ f cos / Σ cos' of what is diffuse, Σ f cos / n' c of gloss), n' of the
+    /// directions above the entry's horizon.
+    /// Diffuse light is exact for any shape of cone; gloss of grazing light is not lost among light from above.
     #[default]
     Ratio,
     /// Fluence: L = Σ Φ · Σ f cos / n ([Stadlbauer2023] sec. 3.2).
@@ -43,10 +45,10 @@ pub enum Samples {
 }
 
 /// Directions evenly in a cap, by lanes: part of the cap's height, and the turn about the axis.
-struct Pattern<const N: usize> {
-    height: [f32; N],
-    cos: [f32; N],
-    sin: [f32; N],
+pub(crate) struct Pattern<const N: usize> {
+    pub(crate) height: [f32; N],
+    pub(crate) cos: [f32; N],
+    pub(crate) sin: [f32; N],
 }
 
 impl<const N: usize> Pattern<N> {
@@ -67,140 +69,259 @@ impl<const N: usize> Pattern<N> {
     }
 }
 
-static ONE: LazyLock<Pattern<1>> = LazyLock::new(Pattern::new);
-static FOUR: LazyLock<Pattern<4>> = LazyLock::new(Pattern::new);
-static EIGHT: LazyLock<Pattern<8>> = LazyLock::new(Pattern::new);
-static SIXTEEN: LazyLock<Pattern<16>> = LazyLock::new(Pattern::new);
+pub(crate) static ONE: LazyLock<Pattern<1>> = LazyLock::new(Pattern::new);
+pub(crate) static FOUR: LazyLock<Pattern<4>> = LazyLock::new(Pattern::new);
+pub(crate) static EIGHT: LazyLock<Pattern<8>> = LazyLock::new(Pattern::new);
+pub(crate) static SIXTEEN: LazyLock<Pattern<16>> = LazyLock::new(Pattern::new);
 static SIXTY_FOUR: LazyLock<Pattern<64>> = LazyLock::new(Pattern::new);
 
-/// Sums over a cone's directions, of what reflectance is made of: n·l (1 − f), D V n·l (1 − f), D V n·l f with f Schlick's fifth power, n·l,
-/// and n'·l of the entry's normal.
+/// Directions that are shaded together. A cone of 64 fills them.
+const LANES: usize = 64;
+/// Lanes of a step: what the compiler makes vectors of.
+const STEP: usize = 8;
+/// Cones that wait to be shaded together.
+const WAITING: usize = 32;
+
+/// A cone whose directions lie in the lanes.
 #[derive(Clone, Copy, Default)]
-struct Sums {
-    diffuse: f32,
+struct Waiting {
+    /// What each direction brings, times what of it is reflected, is radiance.
+    energy: Vec3,
+    /// Of that, times this, for gloss.
     gloss: f32,
-    grazing: f32,
-    cosine: f32,
-    entry: f32,
+    first: usize,
+    count: usize,
 }
 
-/// A surface about to be shaded.
-pub(crate) struct Lens<'a> {
+/// Where cones of one surface after the other are shaded: made once a task, for clearing it would take as long as what is done in it.
+pub(super) struct Lanes {
+    x: [f32; LANES],
+    y: [f32; LANES],
+    z: [f32; LANES],
+    diffuse: [f32; LANES],
+    gloss: [f32; LANES],
+    grazing: [f32; LANES],
+    waiting: [Waiting; WAITING],
+}
+
+impl Lanes {
+    pub(super) fn new() -> Lanes {
+        let empty = [0.0; LANES];
+        Lanes {
+            x: empty,
+            y: empty,
+            z: empty,
+            diffuse: empty,
+            gloss: empty,
+            grazing: empty,
+            waiting: [Waiting::default(); WAITING],
+        }
+    }
+}
+
+/// A surface about to be shaded, with cones that wait for it: directions of many cones are worked on at once, as most cones have one alone.
+pub(super) struct Lens<'a> {
     point: &'a ShadingPoint,
     n_dot_v: f32,
+    n_dot_v_signed: f32,
     a2: f32,
+    lambda_v: f32,
+    /// 2 (1 − cos a) of cones from which on 4, 8 and 16 directions are needed.
+    widths: [f32; 3],
+    form: Form,
+    samples: Samples,
+    lanes: &'a mut Lanes,
+    used: usize,
+    count: usize,
+    radiance: Vec3,
+}
+
+/// Normals that an entry's cones stand over.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ground {
+    pub(super) normal: Vec3,
+    pub(super) normal_shading: Vec3,
 }
 
 impl<'a> Lens<'a> {
-    pub(crate) fn of(point: &'a ShadingPoint) -> Lens<'a> {
-        let n_dot_v = point.normal_shading_world.dot(point.to_viewer_world).clamp(1e-3, 1.0);
-        Lens { point, n_dot_v, a2: point.reflectance.alpha * point.reflectance.alpha }
+    pub(super) fn of(point: &'a ShadingPoint, shading: &SlcShading, lanes: &'a mut Lanes) -> Lens<'a> {
+        let n_dot_v_signed = point.normal_shading_world.dot(point.to_viewer_world);
+        let n_dot_v = n_dot_v_signed.clamp(1e-3, 1.0);
+        let a2 = point.reflectance.alpha * point.reflectance.alpha;
+        // By the chord of the cone's angle, about the angle itself; perceptual roughness squared is alpha.
+        let lobe = 0.04 + 0.6 * point.reflectance.alpha;
+        Lens {
+            point,
+            n_dot_v,
+            n_dot_v_signed,
+            a2,
+            lambda_v: (n_dot_v * n_dot_v * (1.0 - a2) + a2).sqrt(),
+            widths: [0.25, 0.6, 1.2].map(|part| (part * lobe) * (part * lobe)),
+            form: shading.form,
+            samples: shading.samples,
+            lanes,
+            used: 0,
+            count: 0,
+            radiance: Vec3::ZERO,
+        }
     }
 
-    /// Radiance that the cone's light leaves towards the viewer.
-    pub(super) fn shade(&self, cap: &Cap, entry_normal: Vec3, shading: &SlcShading) -> Vec3 {
-        let count = match shading.samples {
-            Samples::Fixed(n) => n,
-            Samples::Adaptive => self.needed(cap),
-        };
-        self.shade_as(cap, entry_normal, (count, shading.form, self.a2))
+    /// Adds a cone of an entry, of whose light this part counts.
+    pub(super) fn add(&mut self, cap: &Cap, ground: &Ground, part: f32) {
+        match self.needed(cap) {
+            0..4 => self.spread(cap, ground, part, &*ONE),
+            4..8 => self.spread(cap, ground, part, &*FOUR),
+            8..16 => self.spread(cap, ground, part, &*EIGHT),
+            16..64 => self.spread(cap, ground, part, &*SIXTEEN),
+            64.. => self.spread(cap, ground, part, &*SIXTY_FOUR),
+        }
     }
 
-    /// The same of irradiance on the point's own shading normal, with a gloss so wide that the directions of the pattern run into each
-    /// other: each stands for its part of the cone. On smooth surfaces wide cones are mirrored whole, not as dots.
-    pub(crate) fn shade_evenly(&self, cap: &Cap) -> Vec3 {
-        let count = self.needed(cap);
-        // Half vectors turn by half of what directions do; α is about the tangent of the lobe's half width.
-        let part = (1.0 - cap.cos_angle) / (2 * count) as f32;
-        let a2 = (self.a2 + part.max(0.0)).min(self.a2.max(1.0));
-        self.shade_as(cap, self.point.normal_shading_world, (count, Form::Ratio, a2))
-    }
-
-    fn shade_as(&self, cap: &Cap, entry_normal: Vec3, (count, form, a2): (u32, Form, f32)) -> Vec3 {
-        let (sums, n) = match count {
-            0..4 => (self.sums(cap, entry_normal, a2, &*ONE), 1.0),
-            4..8 => (self.sums(cap, entry_normal, a2, &*FOUR), 4.0),
-            8..16 => (self.sums(cap, entry_normal, a2, &*EIGHT), 8.0),
-            16..64 => (self.sums(cap, entry_normal, a2, &*SIXTEEN), 16.0),
-            64.. => (self.sums(cap, entry_normal, a2, &*SIXTY_FOUR), 64.0),
-        };
-        let over = match form {
-            Form::Fluence => n,
-            // Light that reached the entry came from above its horizon, wherever rounding puts the cone.
-            Form::Ratio => sums.entry.max(LEAST_COSINE * n),
-        };
-        let r = &self.point.reflectance;
-        let reflected = match r.specular {
-            true => {
-                r.diffuse * (Vec3::ONE - r.f0) * (FRAC_1_PI * sums.diffuse)
-                    + r.f0 * sums.gloss
-                    + Vec3::splat(sums.grazing)
-            }
-            false => r.diffuse * (FRAC_1_PI * sums.cosine),
-        };
-        cap.energy * reflected / over
+    /// Radiance that the light of all cones leaves towards the viewer.
+    pub(super) fn radiance(mut self) -> Vec3 {
+        self.flush();
+        self.radiance
     }
 
     /// Directions that a cone needs on this surface.
     fn needed(&self, cap: &Cap) -> u32 {
-        // Chord of the angle, about the angle itself; perceptual roughness squared is alpha.
-        let angle = (2.0 * (1.0 - cap.cos_angle)).max(0.0).sqrt();
-        match angle / (0.04 + 0.6 * self.point.reflectance.alpha) {
-            q if q < 0.25 => 1,
-            q if q < 0.6 => 4,
-            q if q < 1.2 => 8,
-            _ => 16,
+        match self.samples {
+            Samples::Fixed(n) => n,
+            Samples::Adaptive => {
+                let width = 2.0 * (1.0 - cap.cos_angle);
+                [1, 4, 8, 16][self.widths.iter().filter(|least| width >= **least).count()]
+            }
         }
     }
 
-    fn sums<const N: usize>(&self, cap: &Cap, entry_normal: Vec3, a2: f32, pattern: &Pattern<N>) -> Sums {
-        let (tangent, bitangent) = orthonormal_basis(cap.direction);
-        let in_frame = |v: Vec3| [v.dot(tangent), v.dot(bitangent), v.dot(cap.direction)];
-        let shading = in_frame(self.point.normal_shading_world);
-        let geometric = in_frame(self.point.normal_world);
-        let viewer = in_frame(self.point.to_viewer_world);
-        let entry = in_frame(entry_normal);
-        let depth = 1.0 - cap.cos_angle;
-        let nv = self.n_dot_v;
-        let lambda_v = (nv * nv * (1.0 - a2) + a2).sqrt();
-        let mut lanes = [[0.0f32; N]; 5];
-        #[allow(clippy::needless_range_loop)] // five lists of lanes at once
-        for i in 0..N {
-            let below = depth * pattern.height[i];
-            let (z, radius) = (1.0 - below, (below * (2.0 - below)).max(0.0).sqrt());
-            let (x, y) = (radius * pattern.cos[i], radius * pattern.sin[i]);
-            let dot = |v: [f32; 3]| v[0] * x + v[1] * y + v[2] * z;
-            let above = if dot(geometric) > 0.0 { 1.0f32 } else { 0.0 };
-            let nl = dot(shading).max(0.0) * above;
-            let vl = dot(viewer);
-            // h = (v + l) / |v + l|, |v + l|² = 2 + 2 v·l.
-            let reciprocal = 1.0 / (2.0 + 2.0 * vl).max(1e-6).sqrt();
-            let vh = ((1.0 + vl) * reciprocal).clamp(0.0, 1.0);
-            let nh = ((self.n_dot_v_signed() + dot(shading)) * reciprocal).clamp(0.0, 1.0);
-            let miss = 1.0 - vh;
-            let f5 = miss * miss * miss * miss * miss;
-            let f = (1.0 - nh) * (1.0 + nh) + nh * nh * a2;
-            let d = a2 * FRAC_1_PI / (f * f);
-            let nl_safe = nl.max(1e-3);
-            let v = 0.5 / (nl_safe * lambda_v + nv * (nl_safe * nl_safe * (1.0 - a2) + a2).sqrt());
-            let dv = d * v * nl;
-            lanes[0][i] = nl * (1.0 - f5);
-            lanes[1][i] = dv * (1.0 - f5);
-            lanes[2][i] = dv * f5;
-            lanes[3][i] = nl;
-            lanes[4][i] = dot(entry).max(0.0);
+    /// Puts a cone's directions into the lanes.
+    fn spread<const N: usize>(&mut self, cap: &Cap, ground: &Ground, part: f32, pattern: &Pattern<N>) {
+        if self.used + N > LANES || self.count == WAITING {
+            self.flush();
         }
-        let [diffuse, gloss, grazing, cosine, entry] = lanes.map(|lane| sum_of(&lane));
-        Sums { diffuse, gloss, grazing, cosine, entry }
+        let (first, axis) = (self.used, cap.direction);
+        let lanes = first..first + N;
+        let Lanes { x, y, z, .. } = &mut *self.lanes;
+        let (x, y, z) = (&mut x[lanes.clone()], &mut y[lanes.clone()], &mut z[lanes]);
+        if N == 1 {
+            (x[0], y[0], z[0]) = (axis.x, axis.y, axis.z);
+        } else {
+            let (tangent, bitangent) = orthonormal_basis(axis);
+            let depth = 1.0 - cap.cos_angle;
+            for i in 0..N {
+                let below = depth * pattern.height[i];
+                let (up, radius) = (1.0 - below, (below * (2.0 - below)).max(0.0).sqrt());
+                let (along, across) = (radius * pattern.cos[i], radius * pattern.sin[i]);
+                x[i] = axis.x * up + tangent.x * along + bitangent.x * across;
+                y[i] = axis.y * up + tangent.y * along + bitangent.y * across;
+                z[i] = axis.z * up + tangent.z * along + bitangent.z * across;
+            }
+        }
+        let (over, above) = match self.form {
+            Form::Fluence => (N as f32, N as f32),
+            Form::Ratio => {
+                let (n, s) = (ground.normal, ground.normal_shading);
+                let (mut cosines, mut open) = ([0.0f32; N], [0.0f32; N]);
+                for i in 0..N {
+                    let above = n.x * x[i] + n.y * y[i] + n.z * z[i] > 0.0;
+                    let cosine = (s.x * x[i] + s.y * y[i] + s.z * z[i]).max(0.0);
+                    cosines[i] = if above { cosine } else { 0.0 };
+                    open[i] = if cosines[i] > 0.0 { 1.0 } else { 0.0 };
+                }
+                // Light that reached the entry came from above its horizon, wherever rounding puts the cone.
+                (sum_of(&cosines).max(LEAST_COSINE * N as f32), sum_of(&open).max(LEAST_OPEN * N as f32))
+            }
+        };
+        let gloss = over / (above * cap.mean_cosine);
+        self.lanes.waiting[self.count] =
+            Waiting { energy: cap.energy * (part / over), gloss, first, count: N };
+        self.count += 1;
+        self.used += N;
     }
 
-    fn n_dot_v_signed(&self) -> f32 {
-        self.point.normal_shading_world.dot(self.point.to_viewer_world)
+    /// Shades what is in the lanes.
+    fn flush(&mut self) {
+        if self.point.reflectance.specular {
+            self.flush_glossy();
+        } else {
+            self.flush_matte();
+        }
+        (self.used, self.count) = (0, 0);
+    }
+
+    fn flush_matte(&mut self) {
+        let Lanes { x, y, z, diffuse: cosines, waiting, .. } = &mut *self.lanes;
+        let (n, s) = (self.point.normal_world, self.point.normal_shading_world);
+        let steps = self.used.div_ceil(STEP);
+        let [x, y, z] = [x, y, z].map(|lane| &lane.as_chunks::<STEP>().0[..steps]);
+        for (((x, y), z), cosines) in x.iter().zip(y).zip(z).zip(cosines.as_chunks_mut::<STEP>().0) {
+            for i in 0..STEP {
+                let above = n.x * x[i] + n.y * y[i] + n.z * z[i] > 0.0;
+                let cosine = (s.x * x[i] + s.y * y[i] + s.z * z[i]).max(0.0);
+                cosines[i] = if above { cosine } else { 0.0 };
+            }
+        }
+        let mut sum = Vec3::ZERO;
+        for cone in &waiting[..self.count] {
+            sum += cone.energy * sum_of(&cosines[cone.first..cone.first + cone.count]);
+        }
+        self.radiance += self.point.reflectance.diffuse * FRAC_1_PI * sum;
+    }
+
+    /// Schlick's fifth power f splits reflectance into three sums over directions: n·l (1 − f), D V n·l (1 − f), D V n·l f.
+    fn flush_glossy(&mut self) {
+        let Lanes { x, y, z, diffuse, gloss, grazing, waiting } = &mut *self.lanes;
+        let (n, s, v) =
+            (self.point.normal_world, self.point.normal_shading_world, self.point.to_viewer_world);
+        let (a2, nv, nv_signed, lambda_v) = (self.a2, self.n_dot_v, self.n_dot_v_signed, self.lambda_v);
+        let steps = self.used.div_ceil(STEP);
+        let [x, y, z] = [x, y, z].map(|lane| &lane.as_chunks::<STEP>().0[..steps]);
+        let [out_diffuse, out_gloss, out_grazing] =
+            [&mut *diffuse, &mut *gloss, &mut *grazing].map(|lane| lane.as_chunks_mut::<STEP>().0);
+        for step in 0..steps {
+            let (x, y, z) = (&x[step], &y[step], &z[step]);
+            let (out_diffuse, out_gloss, out_grazing) =
+                (&mut out_diffuse[step], &mut out_gloss[step], &mut out_grazing[step]);
+            for i in 0..STEP {
+                let (x, y, z) = (x[i], y[i], z[i]);
+                let above = n.x * x + n.y * y + n.z * z > 0.0;
+                let nl_signed = s.x * x + s.y * y + s.z * z;
+                let nl = if above { nl_signed.max(0.0) } else { 0.0 };
+                let vl = v.x * x + v.y * y + v.z * z;
+                // h = (v + l) / |v + l|, |v + l|² = 2 + 2 v·l.
+                let reciprocal = 1.0 / (2.0 + 2.0 * vl).max(1e-6).sqrt();
+                let vh = ((1.0 + vl) * reciprocal).max(0.0).min(1.0);
+                let nh = ((nv_signed + nl_signed) * reciprocal).max(0.0).min(1.0);
+                let miss = 1.0 - vh;
+                let f5 = (miss * miss) * (miss * miss) * miss;
+                let f = (1.0 - nh) * (1.0 + nh) + nh * nh * a2;
+                let nl_safe = nl.max(1e-3);
+                let smith = nl_safe * lambda_v + nv * (nl_safe * nl_safe * (1.0 - a2) + a2).sqrt();
+                // D V n·l in one quotient.
+                let dv = (0.5 * FRAC_1_PI * a2) * nl / (f * f * smith);
+                out_diffuse[i] = nl * (1.0 - f5);
+                out_gloss[i] = dv * (1.0 - f5);
+                out_grazing[i] = dv * f5;
+            }
+        }
+        let (mut matte, mut glossy, mut edge) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+        for cone in &waiting[..self.count] {
+            let lanes = cone.first..cone.first + cone.count;
+            matte += cone.energy * sum_of(&diffuse[lanes.clone()]);
+            glossy += cone.energy * (cone.gloss * sum_of(&gloss[lanes.clone()]));
+            edge += cone.energy * (cone.gloss * sum_of(&grazing[lanes]));
+        }
+        let r = &self.point.reflectance;
+        self.radiance += r.diffuse * (Vec3::ONE - r.f0) * FRAC_1_PI * matte + r.f0 * glossy + edge;
     }
 }
 
 /// Sum of lanes, four chains at a time: one would wait for each addition.
-fn sum_of<const N: usize>(lane: &[f32; N]) -> f32 {
+#[inline]
+fn sum_of(lane: &[f32]) -> f32 {
+    if let [one] = lane {
+        return *one;
+    }
     let mut sums = [0.0f32; 4];
     for chunk in lane.chunks(4) {
         for (sum, value) in sums.iter_mut().zip(chunk) {
@@ -210,5 +331,7 @@ fn sum_of<const N: usize>(lane: &[f32; N]) -> f32 {
     (sums[0] + sums[1]) + (sums[2] + sums[3])
 }
 
+/// Part of a cone above an entry's horizon below which it is not taken at its word.
+const LEAST_OPEN: f32 = 0.125;
 /// Mean cosine at an entry below which a cone is not taken at its word.
 const LEAST_COSINE: f32 = 0.01;

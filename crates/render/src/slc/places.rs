@@ -1,22 +1,28 @@
 //! Where the samples of a picture lie in the charts.
 
-use dapple_scene::{Pose, PosedCamera, Projection, Scene};
+use dapple_scene::{Pose, PosedCamera, Projection, Scene, ShadingPoint};
 use dapple_store::cones::{BACK, Charting, PixelPlace};
 use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::gbuffer::GBuffer;
 
-/// The place of every sample in the charts, with the edge of a pixel there; `None` for the background and what carries no cones.
+/// The place of every sample in the charts, with the edge of a pixel there and the normal that it is shaded with; `None` for the background
+/// and what carries no cones. `points` are the same samples, of [`crate::shade::shading_points`].
 ///
 /// The footprint is that of a surface that faces the viewer at the sample's distance along the camera's axis.
+///
+/// # Panics
+/// If there is not one point a sample.
 pub fn pixel_places(
     scene: &Scene,
     pose: &Pose,
     camera: &PosedCamera,
     gbuffer: &GBuffer,
+    points: &[Option<ShadingPoint>],
     charting: &Charting,
 ) -> Vec<Option<PixelPlace>> {
+    assert_eq!(points.len(), gbuffer.samples().len(), "one point a sample");
     let eye_world = camera.eye_world();
     let axis_world = camera.world_from_view.transform_vector3(Vec3::NEG_Z).normalize_or_zero();
     let height = gbuffer.height as f32;
@@ -30,15 +36,27 @@ pub fn pixel_places(
     samples
         .map(|i| {
             let sample = &gbuffer.samples()[i];
-            let rest = gbuffer.surface_rest(scene, i)?;
-            let position = gbuffer.position_world(scene, pose, i)?;
+            let point = points[i].as_ref()?;
             let (instance, triangle, barycentrics) = (sample.instance, sample.triangle, sample.barycentrics);
-            let mut place =
-                charting.place(instance, triangle, barycentrics, rest.position_rest, rest.normal_rest)?;
+            let mut place = charting.place_with(instance, triangle, barycentrics, || {
+                gbuffer.surface_rest(scene, i).map(|rest| (rest.position_rest, rest.normal_rest))
+            })?;
+            let lean = if point.normal_shading_world == point.normal_world {
+                [0.0; 2]
+            } else {
+                gbuffer.lean(scene, pose, i, point.normal_shading_world)?
+            };
             if sample.is_back_face() {
                 place.chart |= BACK;
             }
-            Some(PixelPlace { instance, triangle, barycentrics, place, footprint_m: edge(position) })
+            Some(PixelPlace {
+                instance,
+                triangle,
+                barycentrics,
+                place,
+                footprint_m: edge(point.position_world),
+                lean,
+            })
         })
         .collect()
 }

@@ -98,6 +98,20 @@ impl Charting {
         Charting { sets }
     }
 
+    /// [`ChartPlace::of`] an instance, of which `rest` gives position and normal at rest if they are needed; `None` also where it has no
+    /// charts.
+    pub fn place_with(
+        &self,
+        instance: u32,
+        triangle: u32,
+        barycentrics: [f32; 2],
+        rest: impl FnOnce() -> Option<(Vec3, Vec3)>,
+    ) -> Option<ChartPlace> {
+        let charts = self.sets.get(instance as usize)?.as_ref()?;
+        let (position, normal) = if charts.is_per_vertex() { rest()? } else { (Vec3::ZERO, Vec3::ZERO) };
+        ChartPlace::of(charts, triangle, barycentrics, position, normal)
+    }
+
     /// [`ChartPlace::of`] an instance; `None` also where it has no charts.
     pub fn place(
         &self,

@@ -21,6 +21,8 @@ pub struct ConeSample {
     pub value: Vec3,
     /// Index of the light.
     pub light: u32,
+    /// Cosine that is in `value`, 0 … 1 (above 0); 1 where that is fluence.
+    pub cosine: f32,
 }
 
 impl ConeSample {

@@ -73,7 +73,7 @@ impl Light {
         };
         let cosine = if irradiance { direction.z } else { 1.0 };
         let value = Vec3::splat(RADIANCE * cosine / density);
-        (direction.z > 0.0).then_some(ConeSample { direction, value, light: 0 })
+        (direction.z > 0.0).then_some(ConeSample { direction, value, light: 0, cosine: 1.0 })
     }
 }
 

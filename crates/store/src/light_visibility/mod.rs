@@ -38,7 +38,7 @@ pub struct LightChange {
 pub enum LightVisibilityError {
     /// Too many.
     #[error(
-        "visibility of {lights} lights at {points} points: at most {MAX_LIGHTS} lights and {MAX_VALUES} values fit; lay fewer points"
+        "visibility of {lights} lights at {points} points: at most {MAX_LIGHTS} lights and {MAX_VALUES} values fit; lay fewer points (--points, --max-points)"
     )]
     TooMany {
         /// Points of the layout.
@@ -83,6 +83,14 @@ impl LightVisibility {
         let points = layout.len();
         let values = check_size(points, lights)?;
         Ok(LightVisibility { points, lights, values: vec![OPEN; values] })
+    }
+
+    /// Whether so many can be held.
+    ///
+    /// # Errors
+    /// There would be more than [`MAX_LIGHTS`] or [`MAX_VALUES`].
+    pub fn check(points: usize, lights: u32) -> Result<(), LightVisibilityError> {
+        check_size(points, lights).map(drop)
     }
 
     /// With these values, light by light.

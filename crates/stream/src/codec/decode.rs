@@ -61,7 +61,9 @@ pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<DecodedLayo
     let lights = if flags & HAS_LIGHTS != 0 { decode_light_count(&mut reader)? } else { 0 };
     let extras = Extras { has_bent, lights };
     let (mut sets, counts) = decode_sets(&mut reader, limits)?;
-    let values = counts.iter().map(|count| *count as u64).sum::<u64>() * u64::from(lights);
+    // Sets without points are work for each light too.
+    let points = counts.iter().map(|count| *count as u64).sum::<u64>();
+    let values = points.max(counts.len() as u64) * u64::from(lights);
     let limit = u64::from(limits.max_light_values).min(MAX_VALUES as u64);
     if values > limit {
         return Err(DecodeError::TooLarge { what: "values of lights", value: values, limit });

@@ -10,7 +10,7 @@ use crate::light_visibility::code_light_changes;
 const COARSEST: u32 = 16;
 
 /// What subscribers are to hold of `store`: what is off by more than `times` its tolerance (index and steps, ascending; 0 of those that are not
-/// listed) as it is there, the rest as it is `held`. `None` where all of it is near enough.
+/// listed, but where `times` is above 1, one step of all) as it is there, the rest as it is `held`. `None` where all of it is near enough.
 pub(super) fn light_changes(
     held: &PointStore,
     store: &PointStore,
@@ -23,21 +23,22 @@ pub(super) fn light_changes(
     for (index, (old, new)) in held.iter().zip(new).enumerate().filter(|(_, (old, new))| old != new) {
         while tolerances.next_if(|(listed, _)| (*listed as usize) < index).is_some() {}
         let tolerance = tolerances.peek().filter(|(listed, _)| *listed as usize == index);
-        if u32::from(old.abs_diff(*new)) > times * tolerance.map_or(0, |(_, steps)| u32::from(*steps)) {
+        let steps = tolerance.map_or(0, |(_, steps)| u32::from(*steps)).max(u32::from(times > 1));
+        if u32::from(old.abs_diff(*new)) > times * steps {
             wanted.get_or_insert_with(|| held.to_vec())[index] = *new;
         }
     }
     wanted
 }
 
-/// As [`light_changes`], in at most so many bytes: the least that is off waits first, and if that is not enough, what is last. Nothing that waits is
-/// lost: it is off the next time too.
+/// As [`light_changes`], in at most so many bytes: the least that is off waits first, and if that is not enough, each value in its turn, from `next` on, which
+/// goes on to where the next call is to begin. Nothing that waits is lost: it is off the next time too.
 pub(super) fn lights_within(
     held: &PointStore,
     store: &PointStore,
     near: &mut Near,
     tolerances: &[(u32, u8)],
-    most_bytes: usize,
+    (most_bytes, next): (usize, &mut usize),
 ) -> Option<Vec<u8>> {
     let values = held.lights()?.values();
     let mut bytes_of = |wanted: &[u8]| {
@@ -58,15 +59,16 @@ pub(super) fn lights_within(
     }
     // Fewer each time, and by no less than an eighth, so that this ends.
     let mut changed = changed_values(values, &wanted);
+    let turn = changed.partition_point(|index| index < next);
+    changed.rotate_left(turn);
     while bytes > most_bytes {
         let share = (most_bytes as f64 / bytes as f64).min(0.97) * 0.9;
         let kept = (changed.len() as f64 * share) as usize;
         for index in changed.drain(kept..) {
             wanted[index] = values[index];
         }
-        if changed.is_empty() {
-            return None;
-        }
+        let Some(last) = changed.last() else { return None };
+        *next = last + 1;
         bytes = bytes_of(&wanted);
     }
     Some(wanted)

@@ -4,8 +4,10 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use dapple_store::charts::Cuts;
-use dapple_store::light_visibility::LightChange;
-use dapple_store::points::{BentChange, Change, LayoutError, PackedNormal, PointLayout, PointStore};
+use dapple_store::light_visibility::{LightChange, MAX_VALUES};
+use dapple_store::points::{
+    BentChange, Change, LayoutError, PackedNormal, PointLayout, PointSet, PointStore,
+};
 
 use super::{Applied, ReceiveError, Subscriber};
 use crate::codec::{Limits, ValueChange};
@@ -147,7 +149,7 @@ impl Parts {
                 stores().map(|store| store.layout().sets().len() as u64).sum(),
             ),
             max_cuts: less(self.limits.max_cuts, cuts),
-            max_light_values: less(self.limits.max_light_values, lights),
+            max_light_values: less(self.limits.max_light_values.min(MAX_VALUES as u32), lights),
             ..self.limits
         }
     }
@@ -206,7 +208,8 @@ impl Parts {
         let part = &self.parts[&number];
         let of_part = part.subscriber.store().expect("it has just come");
         let (held, found) = (self.whole.light_count(), of_part.light_count());
-        let whole = if self.whole.layout().sets().is_empty() {
+        let stays = |set: &PointSet| removed.binary_search(&set.instance).is_err();
+        let whole = if !self.whole.layout().sets().iter().any(stays) {
             of_part.clone()
         } else if held != found {
             // As many lights as one part has, times as many points as another has, may be more than both together.

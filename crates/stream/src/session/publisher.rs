@@ -79,6 +79,8 @@ struct State {
     /// By plane.
     fits: [Fit; PLANES],
     pressure: Pressure,
+    /// Which value of a light is the next in turn, where not all fit.
+    next_light: usize,
     group: u64,
     /// Epoch of the last change, not of the last call.
     epoch: u64,
@@ -174,6 +176,7 @@ impl Publisher {
                     scratch: Scratch::default(),
                     fits: Default::default(),
                     pressure: Pressure::default(),
+                    next_light: 0,
                     group,
                     epoch,
                     deltas: 0,
@@ -275,7 +278,13 @@ impl State {
             return self.encode(epoch, store, exact, lights.as_deref());
         };
         let most = most_bytes.saturating_sub(ENVELOPE_BYTES);
-        let lights = lights_within(&self.store, store, &mut self.near, spending.light_tolerances, most / 2);
+        let lights = lights_within(
+            &self.store,
+            store,
+            &mut self.near,
+            spending.light_tolerances,
+            (most / 2, &mut self.next_light),
+        );
         let lights = lights.as_deref();
         let mut best: Option<Delta> = None;
         let mut search = Search::new(self.pressure, precision, spending.coarseness);

@@ -235,6 +235,8 @@ impl Subscriber {
         }
         if let Some(state) = self.state.as_mut()
             && state.scene_hash == parts.scene_hash
+            // Empty where sets came or went since: a layout is never that.
+            && !state.layout_bytes.is_empty()
             && state.layout_bytes == parts.layout
         {
             let extras = Extras::of(&state.store);

@@ -14,7 +14,7 @@ pub struct Spending<'a> {
     /// Empty, or of another length: 1 everywhere (default).
     pub coarseness: &'a [f32],
     /// By how many steps values of lights may be off before one sees it: index and steps, ascending; those that are not listed, by none (default).
-    /// Under a limit this is raised as far as it takes, and lights get at most half of the bytes.
+    /// Under a limit this is raised as far as it takes (that of those not listed is 1 then), and lights get at most half of the bytes.
     pub light_tolerances: &'a [(u32, u8)],
 }
 

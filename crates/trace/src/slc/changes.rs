@@ -107,7 +107,8 @@ impl<'a> Changes<'a> {
         if self.has_moved(instance) {
             return Change { share: 1.0, hidden: true, new: 0.0 };
         }
-        let (position, normal) = (place.position_world, place.normal_world);
+        // Cones hold light by the cosine to the shading normal.
+        let (position, normal) = (place.position_world, place.normal_shading_world);
         let (mut all, mut part, mut new, mut hidden) = (0.0, 0.0, 0.0, false);
         for light in 0..self.now.len() {
             let mut energy = self.now.arriving(light, position, normal);
@@ -122,7 +123,7 @@ impl<'a> Changes<'a> {
             if changed && self.before.power_of(light) <= 0.0 {
                 new += energy;
             }
-            let covered = self.covered(light, position, normal);
+            let covered = self.covered(light, position, place.normal_world);
             hidden |= covered > 0.0;
             part += energy * if changed { 1.0 } else { covered };
         }
@@ -164,7 +165,7 @@ impl Change {
     /// Turns the cones of lights that moved after them.
     pub(super) fn re_aim(&self, entry: &mut MomentEntry, place: &EntryPlace, changes: &Changes<'_>) {
         let moved = place.position_before_world != place.position_world
-            || place.normal_before_world != place.normal_world;
+            || place.normal_shading_before_world != place.normal_shading_world;
         for (light, changed) in changes.lights.iter().enumerate() {
             if !changed && !moved {
                 continue;
@@ -176,14 +177,28 @@ impl Change {
             let (Some(from), Some(to)) = (a.try_normalize(), b.try_normalize()) else { continue };
             let arriving =
                 |lights: &AreaLights<'_>, position, normal| lights.arriving(light, position, normal);
-            let before = arriving(changes.before, place.position_before_world, place.normal_before_world);
-            let after =
-                if gone { 0.0 } else { arriving(changes.now, place.position_world, place.normal_world) };
-            if before <= 0.0 || then.1 <= 0.0 {
+            let before =
+                arriving(changes.before, place.position_before_world, place.normal_shading_before_world);
+            let after = if gone {
+                0.0
+            } else {
+                arriving(changes.now, place.position_world, place.normal_shading_world)
+            };
+            let fluence = |lights: &AreaLights<'_>, position| arriving(lights, position, Vec3::ZERO);
+            let fluence_before = fluence(changes.before, place.position_before_world);
+            let fluence_after = if gone { 0.0 } else { fluence(changes.now, place.position_world) };
+            if before <= 0.0 || fluence_before <= 0.0 || then.1 <= 0.0 {
                 continue;
             }
             let size_ratio = (now.1 / b.length()) / (then.1 / a.length());
-            entry.re_aim(&ReAim { light: light as u32, from, to, energy_ratio: after / before, size_ratio });
+            entry.re_aim(&ReAim {
+                light: light as u32,
+                from,
+                to,
+                energy_ratio: after / before,
+                fluence_ratio: fluence_after / fluence_before,
+                size_ratio,
+            });
         }
     }
 }

@@ -198,7 +198,7 @@ struct Source {
     pick: Pick,
     sequence: Sequence,
     seed: u64,
-    /// Irradiance, or fluence.
+    /// Irradiance by the shading normal, or fluence.
     with_cosine: bool,
 }
 
@@ -212,24 +212,35 @@ fn take_samples(
     indices: impl ExactSizeIterator<Item = u32>,
     samples: &mut Vec<ConeSample>,
 ) -> u64 {
-    let (position, normal) = (place.position_world, place.normal_world);
+    let normal = place.normal_world;
+    // Places on lights are chosen from where rays leave, so that a ray ends where its sample lies: moved by that little, it would end behind the
+    // face of a light that is near, or seen at a grazing angle.
+    let origin = offset_origin(place.position_world, normal);
+    // Light by the cosine to a surface that bumps turn is what the pixels there reflect; by that to the triangle under it, lights that it
+    // hardly faces would have next to no part in a cone, and bumps that face them would lack their light.
+    let faced = if source.with_cosine { place.normal_shading_world } else { normal };
     let draws = Draws::new(source.sequence, source.seed, site, 0, 1);
     let mut chooser = Chooser::new(source.pick);
-    chooser.aim(lights, position, normal);
+    chooser.aim(lights, origin, faced);
     let mut reaches: Vec<Vec3> = Vec::with_capacity(indices.len());
     for i in indices {
-        let Some(sample) = lights.sample(&chooser, position, draws.at(i)) else {
+        let Some(sample) = lights.sample(&chooser, origin, draws.at(i)) else {
             continue;
         };
-        let cosine = normal.dot(sample.to_light_world);
-        if cosine > 0.0 {
+        let cosine = faced.dot(sample.to_light_world);
+        if cosine > 0.0 && normal.dot(sample.to_light_world) > 0.0 {
             let factor = if source.with_cosine { cosine } else { 1.0 };
             let value = sample.radiance * (factor / sample.density_per_sr);
-            samples.push(ConeSample { direction: sample.to_light_world, value, light: sample.light });
+            samples.push(ConeSample {
+                direction: sample.to_light_world,
+                value,
+                light: sample.light,
+                cosine: factor,
+            });
             reaches.push(sample.reach());
         }
     }
-    let blocked = tracer.occlusion(offset_origin(position, normal), &reaches, 1.0);
+    let blocked = tracer.occlusion(origin, &reaches, 1.0);
     let mut i = 0;
     samples.retain(|_| {
         i += 1;

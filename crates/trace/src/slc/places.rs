@@ -2,7 +2,7 @@
 
 use dapple_scene::glam::{Mat3, Vec3};
 use dapple_scene::{Pose, Scene};
-use dapple_store::cones::{BACK, ConeCache, ConeEntry, EntryId, UpdateQueue};
+use dapple_store::cones::{BACK, ConeCache, ConeEntry, EntryId, TexelPlace, UpdateQueue};
 use rayon::prelude::*;
 
 /// A place on a surface, this moment and the last.
@@ -12,10 +12,12 @@ pub struct EntryPlace {
     pub position_world: Vec3,
     /// Unit normal of the triangle, on the side that was seen; zero for what is not there.
     pub normal_world: Vec3,
+    /// Unit normal that it is shaded with, on the same side: that of the pixel that gave it its place.
+    pub normal_shading_world: Vec3,
     /// Where it was.
     pub position_before_world: Vec3,
-    /// How it was turned.
-    pub normal_before_world: Vec3,
+    /// How its shading normal was turned.
+    pub normal_shading_before_world: Vec3,
 }
 
 /// Places of a frame's queue.
@@ -35,19 +37,33 @@ impl EntryPlaces {
         before: &Pose,
         now: &Pose,
     ) -> EntryPlaces {
+        let still: Vec<bool> = (0..now.instances.len())
+            .map(|i| match (before.instances.get(i), &now.instances[i]) {
+                (Some(then), now) => {
+                    then.world_from_mesh == now.world_from_mesh
+                        && then.is_there() == now.is_there()
+                        && (then.deformed.is_none() && now.deformed.is_none())
+                }
+                (None, _) => false,
+            })
+            .collect();
         let place = |texel: &dapple_store::cones::QueuedTexel| {
-            let at = |pose| {
-                world_place(scene, pose, texel.instance, texel.place.triangle, texel.place.barycentrics)
-            };
-            let Some((position_world, normal)) = at(now) else { return EntryPlace::default() };
-            let (before_world, normal_before) = at(before).unwrap_or((position_world, normal));
             let side =
                 if cache.key(texel.id).is_some_and(|key| key.block.chart & BACK != 0) { -1.0 } else { 1.0 };
+            let at = |pose| world_place(scene, pose, texel.instance, &texel.place, side);
+            let Some([position_world, normal_world, normal_shading_world]) = at(now) else {
+                return EntryPlace::default();
+            };
+            // Between two equal poses nothing is to be found out.
+            let then = if still.get(texel.instance as usize) == Some(&true) { None } else { at(before) };
+            let [position_before_world, _, normal_shading_before_world] =
+                then.unwrap_or([position_world, normal_world, normal_shading_world]);
             EntryPlace {
                 position_world,
-                normal_world: normal * side,
-                position_before_world: before_world,
-                normal_before_world: normal_before * side,
+                normal_world,
+                normal_shading_world,
+                position_before_world,
+                normal_shading_before_world,
             }
         };
         let places: Vec<EntryPlace> = queue.texels.par_iter().with_min_len(1024).map(place).collect();
@@ -72,18 +88,19 @@ impl EntryPlaces {
     }
 }
 
-/// Position and unit normal of a place on an instance's triangle; `None` if it is not there or has no area.
+/// Position, unit normal and unit shading normal of a place on an instance's triangle, seen from its front (`side` 1) or back (−1); `None` if
+/// it is not there or has no area.
 fn world_place(
     scene: &Scene,
     pose: &Pose,
     instance: u32,
-    triangle: u32,
-    [v, w]: [f32; 2],
-) -> Option<(Vec3, Vec3)> {
+    place: &TexelPlace,
+    side: f32,
+) -> Option<[Vec3; 3]> {
     let index = instance as usize;
     let posed = pose.instances.get(index).filter(|p| p.is_there())?;
     let mesh = scene.meshes.get(scene.instances.get(index)?.mesh as usize)?;
-    let corners = mesh.triangles.get(triangle as usize)?;
+    let corners = mesh.triangles.get(place.triangle as usize)?;
     let vertices = scene.vertex_positions(pose, index);
     let map = posed.world_from_mesh;
     let mut world = [Vec3::ZERO; 3];
@@ -94,5 +111,13 @@ fn world_place(
     let (e1, e2) = (b - a, c - a);
     let cross = e1.as_dvec3().cross(e2.as_dvec3()).normalize_or_zero().as_vec3();
     let mirror = if Mat3::from(map.matrix3).determinant() < 0.0 { -1.0 } else { 1.0 };
-    (cross != Vec3::ZERO).then(|| (a + e1 * v + e2 * w, cross * mirror))
+    if cross == Vec3::ZERO {
+        return None;
+    }
+    let ([v, w], [along, across]) = (place.barycentrics, place.lean());
+    let normal = cross * (mirror * side);
+    let upright = (1.0 - along * along - across * across).max(0.0).sqrt();
+    let tangent = e1.normalize_or_zero();
+    let shading = tangent * along + cross.cross(tangent) * across + normal * upright;
+    Some([a + e1 * v + e2 * w, normal, shading.normalize_or(normal)])
 }

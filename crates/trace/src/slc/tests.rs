@@ -55,6 +55,7 @@ impl Rig {
                     barycentrics: weights,
                     place,
                     footprint_m: 7.8e-4,
+                    lean: [0.0; 2],
                 })
             })
             .collect();
@@ -148,6 +149,40 @@ fn entries_have_the_irradiance_of_closed_forms() {
         let cache = rig.settled(40, &SlcParams::default());
         assert_near(mean(&cache), exact, 0.01);
     }
+}
+
+/// Rays leave a little above a surface. Places on lights are those seen from there: chosen from the surface, all of these would lie behind
+/// the light's own face.
+#[test]
+fn a_light_close_by_does_not_hide_itself() {
+    let light = (rectangle(0.375, 0.15), EmitterShape::Triangles, 10.0, over(0.15));
+    let cache = Rig::new(vec![light]).settled(40, &SlcParams::default());
+    assert_near(mean(&cache), 10.0 * rectangle_exact(2.5, 1.0), 0.03);
+}
+
+#[test]
+fn irradiance_is_by_the_cosine_to_the_shading_normal() {
+    let ball = |degrees: f32| {
+        let angle = degrees.to_radians();
+        let at = Vec3::new(2.0 * angle.cos(), 2.0 * angle.sin(), 0.0);
+        (sphere(Vec3::ZERO, 0.2, 16, 24), EmitterShape::Sphere, 10.0, Affine3A::from_translation(at))
+    };
+    // Leans towards +X, along the first edge, by 53°.
+    let leaning = |degrees: f32, lean: [f32; 2]| {
+        let mut rig = Rig::new(vec![ball(degrees)]);
+        rig.pixels.iter_mut().flatten().for_each(|pixel| pixel.lean = lean);
+        mean(&rig.settled(40, &SlcParams::default()))
+    };
+    let whole = 10.0 * PI * 0.01;
+    for degrees in [20.0f32, 60.0, 110.0] {
+        let cosine = (degrees - 53.1301).to_radians().cos();
+        assert_near(leaning(degrees, [0.6, 0.0]) / whole, cosine.max(0.0), 0.015);
+    }
+    // Behind the leaning surface, and before it but under the floor.
+    assert_eq!(leaning(155.0, [0.8, 0.0]), 0.0);
+    assert_eq!(leaning(-15.0, [0.8, 0.0]), 0.0);
+    // Across the first edge it is another axis.
+    assert_near(leaning(60.0, [0.0, 0.6]) / whole, 0.8 * 60f32.to_radians().sin(), 0.015);
 }
 
 #[test]

@@ -65,7 +65,7 @@ fn html_within(results: &Results, folder: &Path, picture_bytes: usize) -> Result
         ("advice", &words::advice(results)),
         ("table", &words::table(results)),
         ("studies_link", studies::link(results)),
-        ("studies", &studies::section(results)),
+        ("studies", &studies::section(results, folder, picture_bytes / 4)),
         ("left_out", &left_out),
         ("made", &words::made(results)),
         ("island", &island),

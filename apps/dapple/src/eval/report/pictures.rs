@@ -151,7 +151,7 @@ pub(super) fn spread(count: usize) -> Vec<usize> {
 }
 
 /// The same pixels in fewer bytes where there is a way; `None` if they are not a picture.
-fn shrink(bytes: &[u8]) -> Option<Vec<u8>> {
+pub(super) fn shrink(bytes: &[u8]) -> Option<Vec<u8>> {
     let picture = image::load(Cursor::new(bytes), ImageFormat::Png).ok()?;
     let smaller = encode(&picture).filter(|smaller| smaller.len() < bytes.len());
     Some(smaller.unwrap_or_else(|| bytes.to_vec()))
@@ -167,6 +167,6 @@ fn encode(picture: &DynamicImage) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-fn media_type(bytes: &[u8]) -> &'static str {
+pub(super) fn media_type(bytes: &[u8]) -> &'static str {
     if bytes.starts_with(b"RIFF") { "image/webp" } else { "image/png" }
 }

@@ -1,8 +1,13 @@
 //! Studies on the page: their words and tables. Plots are drawn by the page's scripts.
 
 use std::fmt::Write;
+use std::path::Path;
 
-use super::results::{Results, StudyTable};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+
+use super::pictures::{media_type, shrink};
+use super::results::{Results, StudyPicture, StudyTable};
 use super::table::{study_lines, study_title};
 use super::words::escape;
 
@@ -12,7 +17,9 @@ pub(super) fn link(results: &Results) -> &'static str {
 }
 
 /// The section; nothing without studies.
-pub(super) fn section(results: &Results) -> String {
+///
+/// Pictures are read from `folder`, as many as fit into `budget_bytes`; of the others only their names are there.
+pub(super) fn section(results: &Results, folder: &Path, mut budget_bytes: usize) -> String {
     let mut html = String::new();
     if results.studies.is_empty() {
         return html;
@@ -34,10 +41,31 @@ pub(super) fn section(results: &Results) -> String {
         for table in &study.tables {
             write_table(&mut html, table);
         }
+        if !study.pictures.is_empty() {
+            html.push_str("<div class=\"shots\">\n");
+            for picture in &study.pictures {
+                write_picture(&mut html, picture, folder, &mut budget_bytes);
+            }
+            html.push_str("</div>\n");
+        }
         html.push_str("</article>\n");
     }
     html.push_str("</section>");
     html
+}
+
+fn write_picture(html: &mut String, picture: &StudyPicture, folder: &Path, budget_bytes: &mut usize) {
+    let (title, file) = (escape(&picture.title), escape(&picture.file));
+    let bytes = std::fs::read(folder.join(&picture.file)).ok().and_then(|bytes| shrink(&bytes));
+    let shown = match bytes.filter(|bytes| bytes.len() <= *budget_bytes) {
+        Some(bytes) => {
+            *budget_bytes -= bytes.len();
+            let data = STANDARD.encode(&bytes);
+            format!("<img src=\"data:{};base64,{data}\" alt=\"{title}\">", media_type(&bytes))
+        }
+        None => format!("<p class=\"empty\">{file}</p>"),
+    };
+    let _ = writeln!(html, "<figure>{shown}<figcaption>{title}</figcaption></figure>");
 }
 
 fn write_table(html: &mut String, table: &StudyTable) {

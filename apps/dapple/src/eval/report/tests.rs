@@ -177,6 +177,7 @@ fn study(name: &str) -> StudyResult {
             rows: vec![StudyRow { name: name.to_owned(), values: vec![Some(1.5), None] }],
         }],
         plots: vec![plot(false), plot(true)],
+        pictures: vec![StudyPicture { title: name.to_owned(), file: "study.png".to_owned() }],
         machine: machine(),
     }
 }

@@ -1,14 +1,18 @@
 //! The studies of a plan, one after the other.
 
+use std::cell::RefCell;
+
 use anyhow::Result;
+use dapple_render::image::Rgb8Image;
 use serde_json::json;
 
-use super::{Run, paths};
+use super::{Run, paths, slug};
 use crate::eval::pair::Starts;
 use crate::eval::plan::StudyEntry;
-use crate::eval::results::{Machine, StudyResult};
+use crate::eval::results::{Machine, StudyPicture, StudyResult};
 use crate::eval::stage::Stage;
 use crate::eval::study::Subject;
+use crate::picture::write_png;
 use crate::source;
 
 impl Run<'_> {
@@ -48,7 +52,8 @@ impl Run<'_> {
             "stage": stage.map(|stage| self.identity(stage)),
             "settings": stage.map(|stage| format!("{:?} {:?}", stage.settings.methods, stage.settings.effort)),
         }));
-        if let Some(found) = self.journal.get(&key, |_: &StudyResult| Vec::new()) {
+        let files = |found: &StudyResult| found.pictures.iter().map(|shot| shot.file.clone()).collect();
+        if let Some(found) = self.journal.get(&key, files) {
             self.reused += 1;
             self.work.finish(&what, work, false);
             return Ok(found);
@@ -56,7 +61,17 @@ impl Run<'_> {
         self.work.begin(&what);
         let bar = &self.work;
         let progress = |part: f64| bar.part(work, part);
-        let found = study.study.run(&Subject { stage, cache: &self.cache, progress: &progress })?;
+        let shots = RefCell::default();
+        let looks = Subject { stage, cache: &self.cache, progress: &progress, shots: &shots };
+        let found = study.study.run(&looks)?;
+        let folder = slug(subject.as_deref().map_or(&*study.kind, |subject| subject));
+        let mut pictures = Vec::new();
+        for (number, shot) in shots.into_inner().into_iter().enumerate() {
+            let file = format!("pictures/{folder}/{}.{}/{number:02}.png", study.kind, key.short());
+            let Rgb8Image { width, height, pixels } = &shot.picture;
+            write_png(&self.out.join(&file), *width, *height, pixels)?;
+            pictures.push(StudyPicture { title: shot.title, file });
+        }
         let found = StudyResult {
             kind: study.kind.clone(),
             title: study.study.title().to_owned(),
@@ -64,6 +79,7 @@ impl Run<'_> {
             notes: found.notes,
             tables: found.tables,
             plots: found.plots,
+            pictures,
             machine: Machine::here(),
         };
         self.journal.put(&key, &found)?;

@@ -22,8 +22,11 @@ mod tests;
 mod traffic;
 mod z_precision;
 
+use std::cell::RefCell;
+
 use anyhow::{Context, Result, bail};
 use dapple_render::gbuffer::{GBuffer, GuardBand, Screen};
+use dapple_render::image::Rgb8Image;
 use dapple_scene::{Pose, PosedCamera};
 use serde::de::DeserializeOwned;
 
@@ -116,6 +119,15 @@ pub(super) struct Subject<'a> {
     pub(super) cache: &'a Cache,
     /// Gets the part that is done.
     pub(super) progress: &'a (dyn Fn(f64) + Sync),
+    /// Takes pictures that show what tables say.
+    pub(super) shots: &'a RefCell<Vec<Shot>>,
+}
+
+/// A picture of a study.
+pub(super) struct Shot {
+    /// A few words.
+    pub(super) title: String,
+    pub(super) picture: Rgb8Image,
 }
 
 /// A moment of the path, without its picture.
@@ -127,6 +139,11 @@ pub(super) struct Moment {
 impl<'a> Subject<'a> {
     pub(super) fn stage(&self) -> Result<&'a Stage<'a>> {
         self.stage.context("this kind of study needs scene = \"FILE\" or builtin = \"NAME\"")
+    }
+
+    /// Keeps a picture for the report.
+    pub(super) fn show(&self, title: impl Into<String>, picture: Rgb8Image) {
+        self.shots.borrow_mut().push(Shot { title: title.into(), picture });
     }
 
     /// The moments of the path that are compared.

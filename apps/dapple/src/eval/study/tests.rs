@@ -47,8 +47,14 @@ fn run_on(
     let cache = Cache::new(folder.path());
     let stage = study.has_scene().then_some(&stage);
     assert!(study.work(stage) > 0.0 && !study.title().is_empty());
-    let findings =
-        study.run(&Subject { stage, cache: &cache, progress: &|part| assert!(part <= 1.0) }).unwrap();
+    let findings = study
+        .run(&Subject {
+            stage,
+            cache: &cache,
+            progress: &|part| assert!(part <= 1.0),
+            shots: &RefCell::default(),
+        })
+        .unwrap();
     assert!(!findings.tables.is_empty() && !findings.notes.is_empty(), "{findings:?}");
     for table in &findings.tables {
         assert!(!table.rows.is_empty(), "{table:?}");

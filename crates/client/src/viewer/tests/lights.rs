@@ -1,12 +1,15 @@
 //! Area lights, as the client on the processor draws them: after updates, switched off, and where the stream has none.
 
 use dapple_render::image::ToneMap;
+use dapple_render::shade::ShadeParams;
 
 use super::*;
 
 /// A beauty picture by the processor, with or without area lights; `None` for the background.
 fn beauty(client: &Client, scene: &Scene, time_s: f64, lights: bool) -> Vec<Option<[u8; 3]>> {
-    let (camera, shade) = (camera(scene, time_s), Default::default());
+    // No sun is made up where lights shine.
+    let shade = ShadeParams { sun_without_lights: !lights, ..ShadeParams::default() };
+    let camera = camera(scene, time_s);
     let params = PictureParams { width: SIZE.0, height: SIZE.1, supersample: 1, shade };
     let mut drawn = client.draw(&camera, time_s, &params).expect("it draws");
     if lights {

@@ -14,7 +14,7 @@ fn tilted(degrees: f32) -> Vec3 {
 }
 
 fn sample(degrees: f32) -> ConeSample {
-    ConeSample { direction: tilted(degrees), value: Vec3::ONE, light: 0 }
+    ConeSample { direction: tilted(degrees), value: Vec3::ONE, light: 0, cosine: 1.0 }
 }
 
 fn cone(degrees: f32, angle: f32) -> BoundingCone {
@@ -228,7 +228,7 @@ proptest! {
         let mut mean = 0.0;
         for (cone, value) in &samples {
             let value = Vec3::splat(*value);
-            entry.update(&[ConeSample { direction: cone.direction, value, light: 0 }], 1, &params);
+            entry.update(&[ConeSample { direction: cone.direction, value, light: 0, cosine: 1.0 }], 1, &params);
             mean += value.y / samples.len() as f32;
         }
         prop_assert!((entry.energy().y - mean).abs() <= mean * 2e-5 + 1e-12);
@@ -249,8 +249,8 @@ proptest! {
         for (bits, drawn, cone) in bits {
             let f = bits.map(f32::from_bits);
             let direction = Vec3::new(f[0], f[1], f[2]);
-            let hostile = ConeSample { direction, value: Vec3::new(f[3], f[4], f[5]), light: 0 };
-            let plain = ConeSample { direction: direction.normalize_or(Vec3::X), value: Vec3::splat(f[6].abs()), light: 1 };
+            let hostile = ConeSample { direction, value: Vec3::new(f[3], f[4], f[5]), light: 0, cosine: 1.0 };
+            let plain = ConeSample { direction: direction.normalize_or(Vec3::X), value: Vec3::splat(f[6].abs()), light: 1, cosine: 1.0 };
             let mut cycle = entry.update(&[hostile, plain], drawn, &params);
             entry.probe(&[Probe { cone, direction, hit: false }], &params, &mut cycle);
             for cone in entry.cones() {

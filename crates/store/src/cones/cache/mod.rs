@@ -12,6 +12,7 @@ mod tests;
 
 use std::collections::HashMap;
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::entry::{ConeEntry, ConeError, check_rules};
@@ -58,6 +59,17 @@ impl CacheParams {
             ("reuse_samples", f64::from(samples), (1..=4095).contains(&samples), "it must be 1 to 4095"),
         ])
     }
+}
+
+/// Where an entry is in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EntrySite {
+    /// Metres.
+    pub position_world: Vec3,
+    /// Unit normal of its triangle, on the side that is seen.
+    pub normal_world: Vec3,
+    /// Unit normal that irradiance in its cones is by the cosine to.
+    pub normal_shading_world: Vec3,
 }
 
 /// Names an entry until the next [`ConeCache::admit`].

@@ -27,6 +27,9 @@ pub struct PixelPlace {
     pub place: ChartPlace,
     /// Edge of the pixel on the surface, metres.
     pub footprint_m: f32,
+    /// How the normal that it is shaded with leans over its triangle: parts of that unit vector along the triangle's first edge and, in its
+    /// plane, across it (towards the third corner), −1 … 1. The rest of it points to the side that is seen. Zero: it is the triangle's own.
+    pub lean: [f32; 2],
 }
 
 /// What one viewer sees.
@@ -72,6 +75,8 @@ pub struct TexelPlace {
     pub triangle: u32,
     /// Weights of its second and third corner.
     pub barycentrics: [f32; 2],
+    /// [`PixelPlace::lean`], in parts of 2¹⁵ − 1.
+    lean: [i16; 2],
     /// Rank among those that ask: squared distance to the texel's centre, in texels, and more outside the texel.
     rank: f32,
 }
@@ -82,10 +87,15 @@ impl TexelPlace {
         self.rank < OUTSIDE
     }
 
-    /// Nearest to the centre first, then lowest triangle, then the barycentrics' bits: no order of pixels changes who wins.
-    fn order(&self) -> (u32, u32, u32, u32) {
+    /// How its shading normal leans over its triangle ([`PixelPlace::lean`]), to 2⁻¹⁶.
+    pub fn lean(&self) -> [f32; 2] {
+        self.lean.map(|part| f32::from(part) / f32::from(i16::MAX))
+    }
+
+    /// Nearest to the centre first, then lowest triangle, then the bits of all else: no order of pixels changes who wins.
+    fn order(&self) -> (u32, u32, u32, u32, [i16; 2]) {
         let [v, w] = self.barycentrics;
-        (self.rank.to_bits(), self.triangle, v.to_bits(), w.to_bits())
+        (self.rank.to_bits(), self.triangle, v.to_bits(), w.to_bits(), self.lean)
     }
 
     /// Takes the other place if that goes before this.
@@ -252,7 +262,10 @@ impl Scratch {
 
     fn want(&mut self, pixel: &PixelPlace, look_up: &LookUp, last: &mut usize) {
         let Some(nearby) = Nearby::of(pixel, look_up.bias) else { return };
-        let place = |rank| TexelPlace { triangle: pixel.triangle, barycentrics: pixel.barycentrics, rank };
+        // What is no number leans nowhere.
+        let lean = pixel.lean.map(|part| (part.clamp(-1.0, 1.0) * f32::from(i16::MAX)) as i16);
+        let place =
+            |rank| TexelPlace { triangle: pixel.triangle, barycentrics: pixel.barycentrics, lean, rank };
         let own = nearby.own();
         self.add(&own, &place(nearby.rank(own.xy())), last);
         if look_up.blend {

@@ -23,6 +23,7 @@ fn floor(width: usize, rows: usize, origin: [f32; 2], pixel_m: f32) -> Vec<Optio
             barycentrics: [0.0; 2],
             place,
             footprint_m: pixel_m,
+            lean: [0.0; 2],
         })
     };
     (0..width * rows).map(pixel).collect()
@@ -50,9 +51,28 @@ fn scattered(seed: u32, count: u32) -> Vec<Option<PixelPlace>> {
                 texel_m: 0.1,
             },
             footprint_m: 0.1 * libm::exp2f(u(10) * 4.0 - 2.0),
+            lean: [u(11), u(12)],
         })
     };
     (0..count).map(pixel).collect()
+}
+
+#[test]
+fn a_place_keeps_how_its_normal_leans() {
+    let mut pixels = floor(4, 1, [0.0; 2], 1.0);
+    let leans = [[0.25f32, -0.5], [1.0, -1.0], [f32::NAN, 3.0], [0.0, -9.0]];
+    for (pixel, lean) in pixels.iter_mut().flatten().zip(leans) {
+        pixel.lean = lean;
+    }
+    let requests =
+        Requests::gather(&[View { width: 4, pixels: &pixels }], &LookUp { bias: 1.0, blend: false });
+    let mut found: Vec<_> =
+        cache(9).admit(&requests).texels.iter().map(|t| (t.place.triangle, t.place.lean())).collect();
+    found.sort_by_key(|(triangle, _)| *triangle);
+    for ((_, found), asked) in found.iter().zip([[0.25f32, -0.5], [1.0, -1.0], [0.0, 1.0], [0.0, -1.0]]) {
+        assert!((0..2).all(|k| (found[k] - asked[k]).abs() < 1e-4), "{found:?} {asked:?}");
+    }
+    assert_eq!(found.len(), 4);
 }
 
 fn cache(most_blocks: u64) -> ConeCache<MomentEntry> {
@@ -61,7 +81,7 @@ fn cache(most_blocks: u64) -> ConeCache<MomentEntry> {
 }
 
 fn sample(value: f32) -> ConeSample {
-    ConeSample { direction: Vec3::Z, value: Vec3::splat(value), light: 0 }
+    ConeSample { direction: Vec3::Z, value: Vec3::splat(value), light: 0, cosine: 1.0 }
 }
 
 /// Updates the whole queue with one sample of a value that the instance and triangle decide.
@@ -162,7 +182,14 @@ fn a_texel_keeps_its_place_and_its_age_unless_only_neighbours_had_asked() {
     let mut cache = cache(1000);
     let at = |u: f32, triangle| {
         let place = ChartPlace { chart: 0, uv: [u, 0.5], depth: 0.0, size: [50, 1], texel_m: 1.0 };
-        [Some(PixelPlace { instance: 0, triangle, barycentrics: [0.25; 2], place, footprint_m: 1.0 })]
+        [Some(PixelPlace {
+            instance: 0,
+            triangle,
+            barycentrics: [0.25; 2],
+            place,
+            footprint_m: 1.0,
+            lean: [0.0; 2],
+        })]
     };
     let mut admit = |pixels: &[Option<PixelPlace>], update: bool| {
         let queue = cache.admit(&Requests::gather(&[View { width: 1, pixels }], &LookUp::default()));
@@ -318,6 +345,7 @@ fn reads_do_not_leave_the_chart_and_leave_out_what_is_not_known() {
         barycentrics: [0.0; 2],
         place: ChartPlace { chart: 0, uv: [u, v], depth: 0.0, size: [3, 1], texel_m: 1.0 },
         footprint_m: 1.0,
+        lean: [0.0; 2],
     };
     let pixels = [0.5, 1.1, 2.5].map(|u| Some(at(u, 0.5)));
     let queue = cache.admit(&Requests::gather(&[View { width: 3, pixels: &pixels }], &LookUp::default()));
@@ -419,7 +447,7 @@ proptest! {
                 let size = [b[0] as u16, b[1] as u16];
                 let place = ChartPlace { chart: b[2], uv: [f[3], f[4]], depth: f[5], size, texel_m: f[6] };
                 let barycentrics = [f[7], f[8]];
-                Some(PixelPlace { instance: b[0], triangle: b[1], barycentrics, place, footprint_m: f[9] })
+                Some(PixelPlace { instance: b[0], triangle: b[1], barycentrics, place, footprint_m: f[9], lean: [f[0], f[1]] })
             })
             .collect();
         let mut cache = cache(20);

@@ -75,9 +75,10 @@ impl MomentEntry {
                 .map(|(k, other)| (angle_between(other.direction(), direction), k))
                 .fold((f32::INFINITY, 0), |best, next| if next.0 < best.0 { next } else { best });
             let heir = &mut self.cones[heir.1];
-            let before = luminance(heir.energy);
+            let before = heir.fluence;
             heir.energy += cone.energy;
-            heir.moment *= luminance(heir.energy) / before;
+            heir.fluence += cone.fluence;
+            heir.moment *= heir.fluence / before;
         }
     }
 

@@ -17,6 +17,9 @@ use super::lights::LightSet;
 /// Most cones of a [`MomentEntry`].
 pub const MOST_MOMENT_CONES: usize = 4;
 
+/// Mean cosine of a cone's light below which it is taken to be this: keeps what gloss there is of grazing light within bounds.
+const LEAST_COSINE: f32 = 1.0 / 4096.0;
+
 /// How moment cones are kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MomentParams {
@@ -81,7 +84,9 @@ impl MomentParams {
 pub struct MomentCone {
     /// Energy that arrives through the cone: irradiance, W/m² (or fluence, if the samples were).
     pub energy: Vec3,
-    /// Mean of luminance × direction over all samples, W/m². Not longer than the energy's luminance, but for rounding.
+    /// Luminance of the light that arrives, whatever its cosine, W/m²: not less than the energy's.
+    pub fluence: f32,
+    /// Mean of that × direction over all samples, W/m². Not longer than `fluence`, but for rounding.
     pub moment: Vec3,
     /// Where the energy came from.
     pub lights: LightSet,
@@ -95,14 +100,23 @@ impl MomentCone {
     }
 
     /// Cosine of the opening angle (axis to rim), −1 … 1: that of the cap which, evenly bright, has the same moment, for which
-    /// |m| / lum(E) = (1 + cos a) / 2.
+    /// |m| / Φ = (1 + cos a) / 2.
     #[inline]
     pub fn cos_angle(&self) -> f32 {
-        let luminance = luminance(self.energy);
-        if luminance < GONE {
+        if self.fluence < GONE {
             return 1.0;
         }
-        (2.0 * self.moment.length() / luminance - 1.0).clamp(-1.0, 1.0)
+        (2.0 * self.moment.length() / self.fluence - 1.0).clamp(-1.0, 1.0)
+    }
+
+    /// [`MomentCone::direction`] and [`MomentCone::cos_angle`], with one root.
+    #[inline]
+    pub fn axis(&self) -> (Vec3, f32) {
+        let length = self.moment.length();
+        if self.fluence < GONE || !(1e-17..1e17).contains(&length) {
+            return (self.direction(), self.cos_angle());
+        }
+        (self.moment / length, (2.0 * length / self.fluence - 1.0).clamp(-1.0, 1.0))
     }
 
     /// Opening angle, axis to rim, radians, 0 … π.
@@ -110,19 +124,38 @@ impl MomentCone {
         libm::acosf(self.cos_angle())
     }
 
-    /// A cone with a given axis (unit vector), energy and cosine of the opening angle.
-    pub fn from_cap(direction: Vec3, cos_angle: f32, energy: Vec3, lights: LightSet) -> MomentCone {
-        let length = luminance(energy) * 0.5 * (1.0 + cos_angle.clamp(-1.0, 1.0));
-        MomentCone { energy, moment: direction * length, lights }
+    /// A cone with a given axis (unit vector), cosine of the opening angle, energy, and mean cosine of its light: luminance of the energy ÷
+    /// fluence, above 0 (less than 2⁻¹² counts as that) and up to 1.
+    pub fn from_cap(
+        direction: Vec3,
+        cos_angle: f32,
+        energy: Vec3,
+        mean_cosine: f32,
+        lights: LightSet,
+    ) -> MomentCone {
+        let fluence = luminance(energy) / mean_cosine.clamp(LEAST_COSINE, 1.0);
+        let length = fluence * 0.5 * (1.0 + cos_angle.clamp(-1.0, 1.0));
+        MomentCone { energy, fluence, moment: direction * length, lights }
+    }
+
+    /// Luminance of the energy ÷ fluence, 2⁻¹² … 1: with irradiance, the mean cosine of the light.
+    #[inline]
+    pub fn mean_cosine(&self) -> f32 {
+        if self.fluence < GONE {
+            return 1.0;
+        }
+        (luminance(self.energy) / self.fluence).clamp(LEAST_COSINE, 1.0)
     }
 
     fn scale(&mut self, factor: f32) {
         self.energy *= factor;
+        self.fluence *= factor;
         self.moment *= factor;
     }
 
     fn absorb(&mut self, other: &MomentCone) {
         self.energy += other.energy;
+        self.fluence += other.fluence;
         self.moment += other.moment;
         self.lights = self.lights.union(other.lights);
     }
@@ -139,6 +172,8 @@ pub struct ReAim {
     pub to: Vec3,
     /// Unoccluded energy now ÷ before, ≥ 0.
     pub energy_ratio: f32,
+    /// The same of fluence.
+    pub fluence_ratio: f32,
     /// Its apparent radius now ÷ before, ≥ 0.
     pub size_ratio: f32,
 }
@@ -158,8 +193,10 @@ impl MomentEntry {
     pub fn from_parts(cones: &[MomentCone], samples: u16, taken: u32) -> MomentEntry {
         let mut entry = MomentEntry { samples, taken, ..MomentEntry::default() };
         for cone in cones.iter().take(MOST_MOMENT_CONES) {
-            let valid =
-                cone.energy.is_finite() && cone.moment.is_finite() && cone.energy.min_element() >= 0.0;
+            let valid = cone.energy.is_finite()
+                && cone.moment.is_finite()
+                && cone.fluence.is_finite()
+                && cone.energy.min_element() >= 0.0;
             if valid && luminance(cone.energy) >= LEAST_ENERGY {
                 entry.cones[usize::from(entry.count)] = *cone;
                 entry.count += 1;
@@ -192,7 +229,7 @@ impl MomentEntry {
     /// Takes the samples of one update: `drawn` were drawn, of which those in `samples` reached a light; the others are zeros. With
     /// N drawn, β = N / (C + N) and
     ///
-    /// E ← (1 − β) E + β/N Σ x, m ← (1 − β) m + β/N Σ lum(x) w, C ← min(C + N, C_max)
+    /// E ← (1 − β) E + β/N Σ x, Φ ← (1 − β) Φ + β/N Σ φ, m ← (1 − β) m + β/N Σ φ w with φ = lum(x) / cosine, C ← min(C + N, C_max)
     ///
     /// for every cone, over the samples that went to it. So the energies of all cones add up to the mean of all samples (with
     /// C at its limit, a mean that forgets), to rounding, in whatever order they come.
@@ -211,8 +248,9 @@ impl MomentEntry {
         for sample in samples {
             if let Some((value, direction)) = sample.usable() {
                 let value = value * weight;
-                let moment = direction * luminance(value);
-                let cone = MomentCone { energy: value, moment, lights: LightSet::one(sample.light) };
+                let fluence = luminance(value) / sample.cosine.clamp(LEAST_COSINE, 1.0);
+                let moment = direction * fluence;
+                let cone = MomentCone { energy: value, fluence, moment, lights: LightSet::one(sample.light) };
                 self.insert(&cone, direction, sample.light, params);
             }
         }
@@ -238,7 +276,7 @@ impl MomentEntry {
     pub fn re_aim(&mut self, aim: &ReAim) -> usize {
         let (Some(from), Some(to)) = (unit(aim.from), unit(aim.to)) else { return 0 };
         let valid = |ratio: f32| ratio.is_finite() && ratio >= 0.0;
-        if !valid(aim.energy_ratio) || !valid(aim.size_ratio) {
+        if ![aim.energy_ratio, aim.fluence_ratio, aim.size_ratio].into_iter().all(valid) {
             return 0;
         }
         let mut turned = 0;
@@ -249,7 +287,9 @@ impl MomentEntry {
             let direction = turn(cone.direction(), from, to);
             let angle = (cone.angle() * aim.size_ratio).min(std::f32::consts::PI);
             let energy = (cone.energy * aim.energy_ratio).min(Vec3::splat(MOST_ENERGY));
-            *cone = MomentCone::from_cap(direction, libm::cosf(angle), energy, cone.lights);
+            let fluence = cone.fluence * aim.fluence_ratio;
+            let cosine = if fluence > 0.0 { luminance(energy) / fluence } else { 1.0 };
+            *cone = MomentCone::from_cap(direction, libm::cosf(angle), energy, cosine, cone.lights);
             turned += 1;
         }
         self.drop_dark();

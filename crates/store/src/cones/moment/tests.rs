@@ -10,7 +10,7 @@ use super::super::test_lights::Light;
 use super::*;
 
 fn sample(direction: Vec3, value: Vec3, light: u32) -> ConeSample {
-    ConeSample { direction, value, light }
+    ConeSample { direction, value, light, cosine: 1.0 }
 }
 
 /// Unit vector at an angle from +Z, towards +X.
@@ -113,12 +113,12 @@ proptest! {
             let plain = sample(Vec3::new(f[0], f[1], f[2]).normalize_or(Vec3::X), Vec3::splat(f[6].abs()), light);
             entry.update(&[hostile, plain], drawn, &params);
             let [from, to] = [Vec3::new(f[0], f[1], f[2]), Vec3::new(f[3], f[4], f[5])];
-            entry.re_aim(&ReAim { light, from, to, energy_ratio: f[6], size_ratio: f[7] });
+            entry.re_aim(&ReAim { light, from, to, energy_ratio: f[6], fluence_ratio: f[6], size_ratio: f[7] });
             for cone in entry.cones() {
                 prop_assert!(cone.energy.is_finite() && cone.energy.min_element() >= 0.0, "{cone:?}");
                 prop_assert!(cone.moment.is_finite() && cone.angle().is_finite(), "{cone:?}");
                 prop_assert!((cone.direction().length() - 1.0).abs() < 1e-5, "{cone:?}");
-                prop_assert!(cone.moment.length() <= luminance(cone.energy) * 1.0001 + 1e-18, "{cone:?}");
+                prop_assert!(cone.moment.length() <= cone.fluence * 1.0001 + 1e-18, "{cone:?}");
             }
         }
     }
@@ -126,7 +126,7 @@ proptest! {
     #[test]
     fn a_cap_has_its_angle(angle in 0f32..PI, x in -1f32..1.0, y in -1f32..1.0) {
         let axis = Vec3::new(x, y, 0.7).normalize();
-        let cone = MomentCone::from_cap(axis, libm::cosf(angle), Vec3::new(0.2, 3.0, 1.0), LightSet::one(1));
+        let cone = MomentCone::from_cap(axis, libm::cosf(angle), Vec3::new(0.2, 3.0, 1.0), 1.0, LightSet::one(1));
         prop_assert!((libm::cosf(cone.angle()) - libm::cosf(angle)).abs() < 1e-6);
         prop_assert!(angle > 3.13 || cone.direction().distance(axis) < 1e-3);
     }
@@ -264,7 +264,14 @@ fn a_cone_of_one_light_follows_it() {
     }
     entry.update(&[sample(tilted(-50.0), Vec3::ONE, 4)], 2, &params);
     let before = entry;
-    let aim = ReAim { light: 3, from: tilted(10.0), to: tilted(40.0), energy_ratio: 0.5, size_ratio: 2.0 };
+    let aim = ReAim {
+        light: 3,
+        from: tilted(10.0),
+        to: tilted(40.0),
+        energy_ratio: 0.5,
+        fluence_ratio: 0.5,
+        size_ratio: 2.0,
+    };
     assert_eq!(entry.re_aim(&aim), 1);
     let [turned, other] = entry.cones() else { panic!("two cones") };
     assert!((tilt(turned.direction()) - 40.0).abs() < 0.1);
@@ -272,15 +279,22 @@ fn a_cone_of_one_light_follows_it() {
     assert!((turned.energy.y / before.cones()[0].energy.y - 0.5).abs() < 1e-6);
     assert_eq!(other, &before.cones()[1]);
     // Opposite: half a turn about whatever axis, and back again.
-    let aim = ReAim { from: tilted(40.0), to: -tilted(40.0), energy_ratio: 1.0, size_ratio: 1.0, ..aim };
+    let aim = ReAim {
+        from: tilted(40.0),
+        to: -tilted(40.0),
+        energy_ratio: 1.0,
+        fluence_ratio: 1.0,
+        size_ratio: 1.0,
+        ..aim
+    };
     entry.re_aim(&aim);
     assert!(entry.cones()[0].direction().distance(-tilted(40.0)) < 1e-2);
     // Gone dark.
-    assert_eq!(entry.re_aim(&ReAim { energy_ratio: 0.0, ..aim }), 1);
+    assert_eq!(entry.re_aim(&ReAim { energy_ratio: 0.0, fluence_ratio: 0.0, ..aim }), 1);
     assert_eq!(entry.cones().len(), 1);
     // No number: nothing happens.
     let still = entry;
-    assert_eq!(entry.re_aim(&ReAim { light: 4, energy_ratio: f32::NAN, ..aim }), 0);
+    assert_eq!(entry.re_aim(&ReAim { light: 4, energy_ratio: f32::NAN, fluence_ratio: f32::NAN, ..aim }), 0);
     assert_eq!(entry, still);
 }
 

@@ -32,7 +32,7 @@ fn assert_energy(back: Vec3, energy: Vec3) {
 #[test]
 fn sizes_are_as_promised() {
     assert_eq!((PAPER_BITS, size_of::<PackedPaper>()), (286, 36));
-    assert_eq!((size_of::<PackedMoment<3>>(), size_of::<PackedMoment<4>>()), (46, 60));
+    assert_eq!((size_of::<PackedMoment<3>>(), size_of::<PackedMoment<4>>()), (52, 68));
     // The two bits beyond stay free.
     let cones = [BoundingCone { direction: -Vec3::Y, angle: PI, energy: Vec3::splat(1e30) }; 3];
     let full = PackedPaper::pack(&BoundingEntry::from_parts(&cones, 255, 0), Vec3::Z).unwrap();
@@ -93,7 +93,13 @@ fn our_entry_is_within_its_bounds() {
                 let u = uniform(seed, i, 2);
                 let lights = LightSet::from_bits((uniform(seed, i, 3) * 1e6) as u32);
                 // Narrow ones most.
-                MomentCone::from_cap(direction(seed, i), libm::cosf(3.0 * u * u), energy(seed, i), lights)
+                MomentCone::from_cap(
+                    direction(seed, i),
+                    libm::cosf(3.0 * u * u),
+                    energy(seed, i),
+                    0.01 + 0.99 * u,
+                    lights,
+                )
             })
             .collect();
         let samples = (uniform(seed, 51, 0) * 4096.0) as u16;
@@ -148,7 +154,7 @@ fn packing_after_every_update_does_not_drift() {
 
 #[test]
 fn confidence_is_cut_in_place() {
-    let cone = MomentCone::from_cap(Vec3::X, 0.9, Vec3::ONE, LightSet::one(9));
+    let cone = MomentCone::from_cap(Vec3::X, 0.9, Vec3::ONE, 1.0, LightSet::one(9));
     let entry = MomentEntry::from_parts(&[cone], 200, 77);
     let mut packed = PackedMoment::<3>::pack(&entry).unwrap();
     let before = packed.unpack();
@@ -172,7 +178,7 @@ proptest! {
     fn any_bits_are_an_entry(
         paper in prop::collection::vec(any::<u8>(), 36),
         header: [u8; 4],
-        cones in prop::array::uniform4(prop::array::uniform14(any::<u8>())),
+        cones in prop::array::uniform4(prop::array::uniform16(any::<u8>())),
         normal in any::<u32>(),
     ) {
         let normal = direction(normal, 0);

@@ -44,6 +44,8 @@ pub struct LightTracker {
     /// Which values are to be found again, one each.
     is_due: Vec<bool>,
     due: usize,
+    /// What it took to find all of them at first.
+    first: VisibilityCounts,
     /// Where the next step goes on.
     next: usize,
     /// The scene as it was at the last step.
@@ -65,7 +67,7 @@ impl LightTracker {
     ) -> Result<LightTracker, LightVisibilityError> {
         let sites = sites_world(layout, anchors, scene, pose);
         let lights = AreaLights::new(scene, pose);
-        let (values, _) = trace_visibility(layout, &sites, tracer, &lights, &params.visibility)?;
+        let (values, first) = trace_visibility(layout, &sites, tracer, &lights, &params.visibility)?;
         let is_due = vec![false; values.values().len()];
         let mut tracker = LightTracker {
             params,
@@ -74,6 +76,7 @@ impl LightTracker {
             values,
             is_due,
             due: 0,
+            first,
             next: 0,
             before: pose.clone(),
             black: 0.0,
@@ -89,6 +92,16 @@ impl LightTracker {
     /// What is known: as good as traced, but for what is due.
     pub fn values(&self) -> &LightVisibility {
         &self.values
+    }
+
+    /// Most rays that a value takes.
+    pub fn rays(&self) -> u32 {
+        self.params.visibility.rays
+    }
+
+    /// What it took to find all of them at first.
+    pub fn first_counts(&self) -> VisibilityCounts {
+        self.first
     }
 
     /// How many values may be others than it says.
@@ -145,12 +158,15 @@ impl LightTracker {
             was.zip(layout.set_of_instance(instance)).is_none_or(|(was, is)| was.len() != is.len())
         };
         let points = layout.len();
-        let mut is_due = vec![false; values.values().len()];
+        let (mut is_due, mut came) = (vec![false; values.values().len()], Vec::new());
         for light in 0..values.lights() as usize {
             for set in layout.sets() {
                 let at = light * points + set.first as usize..light * points + set.first as usize + set.len();
                 match self.layout.set_of_instance(set.instance).filter(|_| !is_new(set.instance)) {
-                    None => is_due[at].fill(true),
+                    None => {
+                        came.extend(at.clone());
+                        is_due[at].fill(true);
+                    }
                     Some(was) => {
                         let first = light * self.layout.len() + was.first as usize;
                         is_due[at].copy_from_slice(&self.is_due[first..first + was.len()]);
@@ -161,7 +177,9 @@ impl LightTracker {
         (self.sites, self.values) = (sites_world(layout, anchors, scene, pose), values);
         (self.layout, self.is_due, self.next) = (layout.clone(), is_due, 0);
         self.due = self.is_due.iter().filter(|due| **due).count();
-        Ok(self.trace(tracer, &lights, None))
+        let mut counts = VisibilityCounts::default();
+        self.take_in(&came, tracer, &lights, &mut counts);
+        Ok(counts)
     }
 
     /// Goes on to a pose of the same points: finds what may have changed, and traces of that what `ray_budget` has rays for (`None`: all of it), each
@@ -228,16 +246,26 @@ impl LightTracker {
                 left -= 1;
             }
             self.next = at;
-            let found = self.find(&list, tracer, lights);
-            for (index, value, rays) in found {
-                (self.is_due[index], self.due) = (false, self.due - 1);
-                counts.rays += rays;
-                let Some(new) = value else { continue };
-                counts.traced += 1;
-                counts.changed += u64::from(self.values.set(index, new));
-            }
+            self.take_in(&list, tracer, lights, &mut counts);
         }
         counts
+    }
+
+    /// Traces values that are due, in parallel in the caller's rayon pool.
+    fn take_in(
+        &mut self,
+        list: &[usize],
+        tracer: &Tracer,
+        lights: &AreaLights<'_>,
+        counts: &mut VisibilityCounts,
+    ) {
+        for (index, value, rays) in self.find(list, tracer, lights) {
+            (self.is_due[index], self.due) = (false, self.due - 1);
+            counts.rays += rays;
+            let Some(new) = value else { continue };
+            counts.traced += 1;
+            counts.changed += u64::from(self.values.set(index, new));
+        }
     }
 
     /// Values at these indices, with what each took; none where the light does not reach the point.

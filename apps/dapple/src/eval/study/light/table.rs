@@ -4,7 +4,7 @@ use anyhow::Result;
 use serde::Deserialize;
 
 use super::super::{Findings, Study, StudyLine, StudyPlot, StudyTable, Subject, axis, column, line, row};
-use super::{Lit, Quality, Run};
+use super::{Lit, Quality, Run, shown};
 use crate::direct_light::{STEPS_HZ, Sampler, Seen, Technique, truth};
 use crate::eval::stage::Stage;
 
@@ -44,6 +44,11 @@ fn techniques() -> Vec<(&'static str, Technique)> {
         ("slc, one texel", Technique::cones().without_blending()),
         ("slc", Technique::cones()),
     ]
+}
+
+/// Whether a method's first picture is kept: the paper's table, and ours.
+fn is_shown(name: &str) -> bool {
+    ["rt-16", "rt-48", "rt-48, best sampler", "restir-di", "slc-paper", "slc"].contains(&name)
 }
 
 /// What a method gave: name, quality, milliseconds, of them shading, rays a pixel.
@@ -106,6 +111,14 @@ impl Study for LightMethods {
                     if step + 1 == self.steps {
                         let truth = truth(now, lights, &seen[0], self.truth_samples);
                         let last = pictures.split_off(pictures.len() - runs.len());
+                        if number == 0 {
+                            subject.show("truth", shown(size, &truth));
+                            for (run, picture) in
+                                runs.iter().zip(&last).filter(|(run, _)| is_shown(&run.name))
+                            {
+                                subject.show(run.name.clone(), shown(size, picture));
+                            }
+                        }
                         for ((i, run), picture) in runs.iter().enumerate().zip(&last) {
                             if rows.len() <= i {
                                 rows.push((run.name.clone(), Quality::default(), 0.0, 0.0, 0.0));
