@@ -226,3 +226,90 @@ fn quad_of(triangles: &Triangles) -> Option<([Vec3; 4], Vec3)> {
         _ => None,
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "tests may panic")]
+mod tests {
+    use super::*;
+    use crate::area_lights::tests::{Stage, octahedron, square};
+    use crate::{EmitterShape, Mesh};
+    use glam::Affine3A;
+
+    const RADIANCE: Vec3 = Vec3::new(2.0, 1.0, 0.5);
+
+    fn figure(mesh: Mesh, emitter: EmitterShape, triangles: usize, places: usize) -> LightForm {
+        let mut stage = Stage::new();
+        stage.add(mesh, emitter, RADIANCE, Affine3A::from_scale(Vec3::splat(2.0)));
+        let scene = stage.scene();
+        let lights = AreaLights::new(scene, &scene.pose(0.0));
+        let figure = lights.figure(0, triangles, places).unwrap();
+        assert_eq!((figure.radiance, figure.two_sided), (RADIANCE, false));
+        let (center, radius) = figure.form.ball();
+        let (around, most) = lights.bounds(0).unwrap();
+        assert!(center.distance(around) <= most && radius <= 2.0 * most, "{center} {radius}");
+        assert!(lights.figure(1, triangles, places).is_none());
+        figure.form
+    }
+
+    #[test]
+    fn few_triangles_are_told_as_they_are_and_many_by_places_of_the_same_power() {
+        let LightForm::Triangles(all) = figure(octahedron(), EmitterShape::Triangles, 8, 5) else { panic!() };
+        assert_eq!(all.len(), 8);
+        let area = |[a, b, c]: [Vec3; 3]| 0.5 * (b - a).cross(c - a).length();
+        let exact: f32 = all.iter().map(|t| area(t.corners)).sum();
+        let LightForm::Places(places) = figure(octahedron(), EmitterShape::Triangles, 7, 5) else { panic!() };
+        assert_eq!(places.len(), 5);
+        let found: f32 = places.iter().map(|place| place.area_m2).sum();
+        assert!((found - exact).abs() < 1e-4, "{found} {exact}");
+        assert!(
+            places.iter().all(|place| place.normal_world.dot(place.position_world) > 0.0),
+            "they face outwards"
+        );
+    }
+
+    #[test]
+    fn a_triangle_and_two_that_make_a_quadrangle_have_corners() {
+        let LightForm::Quad { corners, normal } = figure(square(), EmitterShape::Triangles, 8, 8) else {
+            panic!()
+        };
+        assert_eq!(normal, Vec3::Z);
+        let across = (corners[2] - corners[0]).cross(corners[3] - corners[1]);
+        assert!((0.5 * across.length() - 16.0).abs() < 1e-4, "{corners:?}");
+        let one = Mesh { triangles: vec![[0, 1, 2]], ..square() };
+        let LightForm::Quad { corners, .. } = figure(one, EmitterShape::Triangles, 8, 8) else { panic!() };
+        assert_eq!(corners[2], corners[3]);
+        // A roof is no plane.
+        let mut bent = square();
+        bent.positions[3].z = 0.5;
+        assert!(
+            matches!(figure(bent, EmitterShape::Triangles, 8, 8), LightForm::Triangles(all) if all.len() == 2)
+        );
+        let LightForm::Quad { normal, .. } = figure(square(), EmitterShape::Rectangle, 8, 8) else {
+            panic!()
+        };
+        assert_eq!(normal, Vec3::Z);
+    }
+
+    #[test]
+    fn pieces_of_a_triangle_fill_it() {
+        for side in 1..6 {
+            let pieces = (0..side * side).map(|piece| piece_corners(side, piece));
+            let area = |[a, b, c]: [[f32; 2]; 3]| {
+                0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+            };
+            let each = 0.5 / (side * side) as f32;
+            let mut middle = [0.0; 2];
+            for piece in pieces {
+                assert!((area(piece) - each).abs() < 1e-5, "{side}: {piece:?}");
+                assert!(piece.iter().all(|[s, t]| *s >= 0.0 && *t >= 0.0 && s + t <= 1.000_01), "{piece:?}");
+                piece
+                    .iter()
+                    .for_each(|at| (0..2).for_each(|k| middle[k] += at[k] / (3 * side * side) as f32));
+            }
+            assert!(
+                (middle[0] - 1.0 / 3.0).abs() < 1e-5 && (middle[1] - 1.0 / 3.0).abs() < 1e-5,
+                "{middle:?}"
+            );
+        }
+    }
+}

@@ -8,16 +8,26 @@ use super::*;
 use crate::{Filter, Image, Instance, Material, Mesh, Node, Part, Texture, TextureRef, Wrap};
 
 /// A scene of lights, each a mesh with a radiance, placed in the world.
-struct Stage {
+pub(super) struct Stage {
     scene: Scene,
 }
 
 impl Stage {
-    fn new() -> Stage {
+    pub(super) fn new() -> Stage {
         Stage { scene: Scene::default() }
     }
 
-    fn add(&mut self, mesh: Mesh, emitter: EmitterShape, radiance: Vec3, world: Affine3A) -> &mut Material {
+    pub(super) fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    pub(super) fn add(
+        &mut self,
+        mesh: Mesh,
+        emitter: EmitterShape,
+        radiance: Vec3,
+        world: Affine3A,
+    ) -> &mut Material {
         let scene = &mut self.scene;
         let material = scene.materials.len() as u32;
         scene.materials.push(Material { emissive_factor: radiance, ..Material::default() });
@@ -39,7 +49,7 @@ impl Stage {
 }
 
 /// A square of side 2 in the plane z = 0, facing +Z.
-fn square() -> Mesh {
+pub(super) fn square() -> Mesh {
     let at = |x: f32, y: f32| Vec3::new(x, y, 0.0);
     Mesh {
         positions: vec![at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)],
@@ -51,7 +61,7 @@ fn square() -> Mesh {
 }
 
 /// Eight faces around the origin, corners at distance 1.
-fn octahedron() -> Mesh {
+pub(super) fn octahedron() -> Mesh {
     let positions = vec![Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z];
     let mut triangles = Vec::new();
     for x in [0u32, 1] {

@@ -2,11 +2,11 @@
 
 use dapple_scene::area_lights::{AreaLights, EmitterShape};
 use dapple_scene::{Material, PosedCamera};
-use dapple_store::light_visibility::{LightVisibility, OPEN};
+use dapple_store::light_visibility::{LightChange, LightVisibility, OPEN};
 use glam::{Affine3A, Vec3};
 
 use super::super::{AtlasBand, LookupId, View};
-use super::harness::{Bench, assert_agrees, inputs, save, twin};
+use super::harness::{Bench, assert_agrees, compare, inputs, save, twin};
 use crate::area_lights::{AreaLightTable, shade_area_lights};
 use crate::compose::compose;
 use crate::gbuffer::GBuffer;
@@ -123,60 +123,89 @@ fn every_form_of_light_is_lit_like_the_twin_and_none_changes_nothing() {
     }
 }
 
-#[test]
-fn lights_are_dimmed_by_what_points_see_of_them() {
-    let stage = stage();
-    let layout = lay(&stage.scene, 0.12);
+/// An atlas of points so far apart that sees waves of each light, and a bench that has it on its card.
+fn dimmed(stage: &Stage, spacing: f32) -> Option<(VisibilityAtlas, LightVisibility, Bench)> {
+    let layout = lay(&stage.scene, spacing);
     let values = vec![255; layout.len()];
     let mut atlas = VisibilityAtlas::new(layout.clone(), &stage.scene, None, AtlasParams::default());
     while !atlas.work(&stage.scene, &values, usize::MAX).is_complete() {}
-    let lights = table(&stage).lights().len() as u32;
-    // Waves over the points, others for each light.
-    let planes: Vec<u8> = (0..lights)
-        .flat_map(|light| {
-            let wave = move |point: usize| libm::sinf(point as f32 * 0.002 * (light + 1) as f32) * 0.5 + 0.5;
-            (0..layout.len()).map(move |point| (wave(point) * f32::from(OPEN) + 0.5) as u8)
-        })
-        .collect();
-    atlas.resolve_lights(&LightVisibility::new(&layout, lights, planes).unwrap());
-    let Some(mut bench) = Bench::new(&stage.scene, 1, &[]) else { return };
+    let table = table(stage);
+    let lights = table.lights().len() as u32;
+    let mut planes = Vec::new();
+    for light in 1..=lights {
+        for set in layout.sets() {
+            planes.extend((0..set.len()).map(|point| {
+                // Along x, others for each light.
+                let x = set.position_rest(point, layout.quantum_m()).x;
+                let wave = libm::sinf(x * 1.3 * light as f32) * 0.5 + 0.5;
+                (wave * f32::from(OPEN) + 0.5) as u8
+            }));
+        }
+    }
+    let held = LightVisibility::new(&layout, lights, planes).unwrap();
+    atlas.resolve_lights(&held);
+    let mut bench = Bench::new(&stage.scene, 1, &[])?;
     for instance in atlas.take_ready() {
         bench.scene.set_charts(&bench.gpu, instance, atlas.charts(instance).unwrap()).unwrap();
         bench.scene.set_pages(&bench.gpu, instance, atlas.placements(instance)).unwrap();
     }
     let layers: Vec<_> = (0..atlas.layers()).map(|layer| atlas.texels(layer)).collect();
     bench.scene.upload_atlas(&bench.gpu, atlas.side(), &layers, &[]).unwrap();
-    atlas.show_lights(table(&stage).lights());
-    let upload = |bench: &mut Bench, atlas: &mut VisibilityAtlas| {
-        let dirty = atlas.take_dirty_lights();
-        let bands =
-            dirty.iter().map(|b| AtlasBand { layer: b.layer, first_row: b.y.start, end_row: b.y.end });
-        let bands: Vec<AtlasBand> = bands.collect();
-        let groups: Vec<_> = atlas.light_texels().iter().map(Vec::as_slice).collect();
-        bench.scene.upload_lights(&bench.gpu, atlas.side(), &groups, &bands).unwrap();
-    };
+    atlas.show_lights(table.lights());
     upload(&mut bench, &mut atlas);
-    bench.scene.set_area_lights(&bench.gpu, &table(&stage));
+    bench.scene.set_area_lights(&bench.gpu, &table);
+    Some((atlas, held, bench))
+}
+
+/// Brings what changed onto the card.
+fn upload(bench: &mut Bench, atlas: &mut VisibilityAtlas) {
+    let dirty = atlas.take_dirty_lights();
+    let bands = dirty.iter().map(|b| AtlasBand { layer: b.layer, first_row: b.y.start, end_row: b.y.end });
+    let bands: Vec<AtlasBand> = bands.collect();
+    let groups: Vec<_> = atlas.light_texels().iter().map(Vec::as_slice).collect();
+    bench.scene.upload_lights(&bench.gpu, atlas.side(), &groups, &bands).unwrap();
+}
+
+#[test]
+fn lights_are_dimmed_by_what_points_see_of_them() {
+    let stage = stage();
+    let Some((mut atlas, held, mut bench)) = dimmed(&stage, 0.12) else { return };
     let open = lit_twin(&stage, &dim(), None).0;
     let (twin, gbuffer) = lit_twin(&stage, &dim(), Some(&atlas));
     assert_agrees("area-dimmed", &draw(&mut bench, &stage, &dim(), LookupId::ATLAS), &twin, &gbuffer);
     assert_ne!(open, twin);
-    // Only what changed is written, and it is all that changed.
-    let blocked = vec![0; layout.len() * lights as usize];
-    let mut changes = Vec::new();
-    let held = LightVisibility::new(&layout, lights, blocked).unwrap();
-    for index in
-        (0..held.values().len() as u32).filter(|index| index % layout.len() as u32 > layout.len() as u32 / 2)
-    {
-        let (light, point) = (index / layout.len() as u32, index % layout.len() as u32);
-        let wave = libm::sinf(point as f32 * 0.002 * (light + 1) as f32) * 0.5 + 0.5;
-        let old = (wave * f32::from(OPEN) + 0.5) as u8;
-        changes.push(dapple_store::light_visibility::LightChange { index, old, new: 0 });
-    }
+    // Only what changed is written, and it is all that changed: half of the points see nothing.
+    let points = held.points() as u32;
+    let changes: Vec<LightChange> = (0u32..)
+        .zip(held.values())
+        .filter(|(index, _)| index % points > points / 2)
+        .map(|(index, old)| LightChange { index, old: *old, new: 0 })
+        .collect();
     atlas.apply_lights(&changes);
     upload(&mut bench, &mut atlas);
+    let (changed, gbuffer) = lit_twin(&stage, &dim(), Some(&atlas));
+    let card = draw(&mut bench, &stage, &dim(), LookupId::ATLAS);
+    assert_agrees("area-changed", &card, &changed, &gbuffer);
+    assert_ne!(changed, twin);
+}
+
+#[test]
+fn triangles_smaller_than_texels_read_one_of_their_vertices() {
+    let mut stage = stage();
+    // Charts of one triangle each would be more than there are vertices.
+    for (i, position) in stage.scene.meshes[1].positions.iter_mut().enumerate() {
+        *position *= if i % 2 == 0 { 0.9 } else { 1.1 };
+    }
+    let Some((atlas, _, mut bench)) = dimmed(&stage, 0.6) else { return };
+    let is_fine = |instance: u32| atlas.charts(instance).is_some_and(|charts| charts.is_per_vertex());
+    assert!(is_fine(1), "the ball has texels at its vertices");
     let (twin, gbuffer) = lit_twin(&stage, &dim(), Some(&atlas));
     let card = draw(&mut bench, &stage, &dim(), LookupId::ATLAS);
-    assert_agrees("area-changed", &card, &twin, &gbuffer);
-    save("area-changed", &card);
+    save("area-vertices-card", &card);
+    save("area-vertices-twin", &twin);
+    let difference = compare(&card, &twin, &gbuffer);
+    eprintln!("area-vertices: {difference:?}");
+    assert!(difference.within > 0.9 && difference.mean < 1.0, "{difference:?}");
+    let open = compare(&card, &lit_twin(&stage, &dim(), None).0, &gbuffer);
+    assert!(open.mean > 5.0 * difference.mean, "{open:?} {difference:?}");
 }
