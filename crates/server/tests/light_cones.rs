@@ -259,7 +259,7 @@ impl Crowd {
         self.server.step(now, &views, &SlcParams::default(), &mut |_| ());
         self.server_ms.push(begun.elapsed().as_secs_f64() * 1e3);
         let place_of = |id| self.server.place_of(id);
-        let shade = |(seen, pixels): (&Seen, _)| {
+        let shade = |(seen, pixels): (&Seen, &Vec<_>)| {
             shade_cones(self.server.cache(), place_of, &seen.points, pixels, &self.shading)
         };
         self.pictures = seen.iter().zip(&pixels).map(shade).collect();
