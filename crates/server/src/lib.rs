@@ -384,7 +384,7 @@ impl Server {
         let points = (self.updater.store().layout(), self.updater.anchors());
         let came = lights.follow(scene, pose, tracer, points)?;
         let left = budget.map(|budget| budget.saturating_sub(taken.saturating_add(came.rays)));
-        Ok(came.add(lights.step(scene, pose, tracer, points.1, left)))
+        Ok(came + lights.step(scene, pose, tracer, points.1, left))
     }
 
     /// From the next step on the scene is changed like this. The edits must be ones that [`Edits::check`] lets pass, and every client

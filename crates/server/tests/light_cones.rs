@@ -9,12 +9,12 @@ use dapple_render::image::{LinearImage, Rgb8Image, ToneMap};
 use dapple_render::shade::shading_points;
 use dapple_render::slc::{Blending, SlcShading, pixel_places, shade_cones};
 use dapple_scene::area_lights::Pick;
-use dapple_scene::glam::Vec3;
+use dapple_scene::glam::{Affine3A, Vec3};
 use dapple_scene::{NoFiles, PosedCamera, Scene, ShadingPoint, builtin};
 use dapple_server::cones::{ConeServer, Now, cone_charts};
 use dapple_store::cones::{CacheParams, Charting, LookUp, MomentEntry, View};
 use dapple_trace::Tracer;
-use dapple_trace::direct::{DirectParams, Sequence, trace_direct};
+use dapple_trace::direct::{DirectParams, Restir, RestirParams, RestirView, Sequence, trace_direct};
 use dapple_trace::slc::SlcParams;
 
 /// A picture of a built-in scene at a moment, before it is lit.
@@ -41,7 +41,10 @@ impl Stage {
     }
 
     fn see(&self, now: &Now<'_>) -> Seen {
-        let camera = self.scene.camera_paths()[0].camera(&self.scene, now.pose);
+        self.see_from(now, self.scene.camera_paths()[0].camera(&self.scene, now.pose))
+    }
+
+    fn see_from(&self, now: &Now<'_>, camera: PosedCamera) -> Seen {
         let [width, height] = self.size;
         let gbuffer = rasterize(&self.scene, now.pose, &camera, width, height, 1).unwrap();
         let points = shading_points(&self.scene, now.pose, &camera, &gbuffer, true);
@@ -174,5 +177,188 @@ fn quality_and_time() {
     for name in ["atrium-lamps", "village", "hangar"] {
         println!("{name}\n| | times as quick | PSNR | SSIM | bias, % |");
         measure(&Stage::new(name, 0.3, [320, 180]), 260, 5, 512);
+    }
+}
+
+/// A step of each rival for all viewers, milliseconds, and its last pictures.
+struct Rival {
+    name: &'static str,
+    reservoirs: Option<Vec<Restir>>,
+    samples: u32,
+    ms: Vec<f64>,
+    pictures: Vec<Vec<Vec3>>,
+}
+
+impl Rival {
+    fn rays(name: &'static str, samples: u32) -> Rival {
+        Rival { name, reservoirs: None, samples, ms: Vec::new(), pictures: Vec::new() }
+    }
+
+    fn all(viewers: usize) -> [Rival; 3] {
+        let reservoirs = Some((0..viewers).map(|_| Restir::new()).collect());
+        let restir = Rival { reservoirs, ..Rival::rays("restir-di", 0) };
+        [Rival::rays("rt-16, power", 16), Rival::rays("rt-48, power", 48), restir]
+    }
+
+    /// Cameras of reservoirs must stand still: each sample's past is that of its own pixel.
+    fn step(&mut self, now: &Now<'_>, size: [u32; 2], seen: &[Seen], frame: u64) {
+        let start = Instant::now();
+        let lights = now.lights(now.pose);
+        let same: Vec<u32> = (0..size[0] * size[1]).collect();
+        let picture = |(viewer, seen): (usize, &Seen)| {
+            let mut out = vec![Vec3::ZERO; seen.points.len()];
+            let (pick, sequence, seed) = (Pick::Power, Sequence::Random, viewer as u64);
+            match &mut self.reservoirs {
+                Some(reservoirs) => {
+                    let view = RestirView {
+                        points: &seen.points,
+                        size: size.map(|side| side as usize),
+                        eye_world: seen.camera.eye_world(),
+                        previous_pixels: (frame > 0).then_some(&same),
+                        past: None,
+                    };
+                    let params = RestirParams { pick, sequence, seed, frame, ..RestirParams::default() };
+                    reservoirs[viewer].trace(now.tracer, &lights, &view, &params, &mut out);
+                }
+                None => {
+                    let params = DirectParams { samples: self.samples, pick, sequence, seed, frame };
+                    trace_direct(now.tracer, &lights, &seen.points, &params, &mut out);
+                }
+            }
+            out
+        };
+        self.pictures = seen.iter().enumerate().map(picture).collect();
+        self.ms.push(start.elapsed().as_secs_f64() * 1e3);
+    }
+}
+
+/// Cones for several viewers: all of a step, and what of it is the server's where clients shade.
+struct Crowd {
+    server: ConeServer<MomentEntry>,
+    shading: SlcShading,
+    ms: Vec<f64>,
+    server_ms: Vec<f64>,
+    pictures: Vec<Vec<Vec3>>,
+}
+
+impl Crowd {
+    fn new(shading: SlcShading) -> Crowd {
+        let server = ConeServer::new(CacheParams::default(), shading.look_up).unwrap();
+        Crowd { server, shading, ms: Vec::new(), server_ms: Vec::new(), pictures: Vec::new() }
+    }
+
+    fn step(&mut self, stage: &Stage, now: &Now<'_>, seen: &[Seen]) {
+        let start = Instant::now();
+        let pixels: Vec<_> = seen
+            .iter()
+            .map(|s| pixel_places(&stage.scene, now.pose, &s.camera, &s.gbuffer, &s.points, &stage.charting))
+            .collect();
+        let views: Vec<View<'_>> =
+            pixels.iter().map(|pixels| View { width: stage.size[0] as usize, pixels }).collect();
+        let begun = Instant::now();
+        self.server.step(now, &views, &SlcParams::default(), &mut |_| ());
+        self.server_ms.push(begun.elapsed().as_secs_f64() * 1e3);
+        let place_of = |id| self.server.place_of(id);
+        let shade = |(seen, pixels): (&Seen, &Vec<_>)| {
+            shade_cones(self.server.cache(), place_of, &seen.points, pixels, &self.shading)
+        };
+        self.pictures = seen.iter().zip(&pixels).map(shade).collect();
+        self.ms.push(start.elapsed().as_secs_f64() * 1e3);
+    }
+}
+
+fn median(ms: &[f64]) -> f64 {
+    let mut sorted = ms.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// Plays a scene to viewers whose cameras `camera` gives, methods in turn; prints what the last steps took, and how the last pictures are.
+fn play(
+    stage: &Stage,
+    viewers: usize,
+    (steps, timed, samples): (u32, u32, u32),
+    camera: &dyn Fn(&Now<'_>, usize) -> PosedCamera,
+) {
+    let mut rivals = Rival::all(viewers);
+    let near = LookUp { blend: false, ..LookUp::default() };
+    let one = SlcShading { look_up: near, ..SlcShading::default() };
+    let mut crowds = [Crowd::new(SlcShading::default()), Crowd::new(one)];
+    let mut tracer = Tracer::new(&stage.scene, &stage.scene.pose(stage.time_s));
+    for step in 0..steps {
+        let pose = stage.scene.pose(stage.time_s + f64::from(step) / 15.0);
+        tracer.update(&stage.scene, &pose);
+        let now = Now { scene: &stage.scene, pose: &pose, tracer: &tracer, environment: None };
+        let seen: Vec<Seen> = (0..viewers).map(|viewer| stage.see_from(&now, camera(&now, viewer))).collect();
+        let is_timed = step + timed >= steps;
+        for rival in &mut rivals {
+            if is_timed || rival.reservoirs.is_some() {
+                rival.step(&now, stage.size, &seen, u64::from(step));
+            }
+        }
+        for crowd in &mut crowds {
+            crowd.step(stage, &now, &seen);
+        }
+        if step + 1 < steps {
+            continue;
+        }
+        let params = DirectParams { samples, seed: 7, ..DirectParams::default() };
+        let truths: Vec<Vec<Vec3>> = seen.iter().map(|seen| rays(&now, &seen.points, &params)).collect();
+        let quality = |pictures: &[Vec<Vec3>]| {
+            let mut sum = [0.0; 3];
+            for (truth, picture) in truths.iter().zip(pictures) {
+                let [db, ssim, bias] = stage.quality(truth, picture);
+                // Errors are averaged, not decibels.
+                sum = [sum[0] + 10f64.powf(-0.1 * db), sum[1] + ssim, sum[2] + bias];
+            }
+            let [mse, ssim, bias] = sum.map(|sum| sum / truths.len() as f64);
+            [-10.0 * mse.log10(), ssim, bias]
+        };
+        let last = |ms: &[f64]| median(&ms[ms.len() - timed as usize..]);
+        let line = |name: &str, ms: f64, server_ms: f64, [db, ssim, bias]: [f64; 3]| {
+            println!("| {name} | {ms:.1} | {server_ms:.1} | {db:.2} | {ssim:.4} | {bias:+.2} |");
+        };
+        for rival in &rivals {
+            line(rival.name, last(&rival.ms), last(&rival.ms), quality(&rival.pictures));
+        }
+        for (name, crowd) in ["slc", "slc, one texel"].iter().zip(&crowds) {
+            line(name, last(&crowd.ms), last(&crowd.server_ms), quality(&crowd.pictures));
+        }
+    }
+}
+
+/// Prints what a step takes where lights move: a viewer who stands.
+#[test]
+#[ignore = "measures; minutes"]
+fn lights_that_move() {
+    for name in ["street", "hangar"] {
+        println!("{name}\n| | ms a step | server's | PSNR | SSIM | bias, % |");
+        let stage = Stage::new(name, 0.3, [320, 180]);
+        let camera = stage.scene.camera_paths()[0].camera(&stage.scene, &stage.scene.pose(stage.time_s));
+        play(&stage, 1, (40, 5, 256), &|_, _| camera);
+    }
+}
+
+/// Prints what a step takes for many viewers: far from each other, and in one place, turned.
+#[test]
+#[ignore = "measures; minutes"]
+fn many_viewers() {
+    let stage = Stage::new("atrium-lamps", 0.3, [160, 90]);
+    let path = &stage.scene.camera_paths()[0];
+    let seconds = path.duration_s().max(1.0);
+    let at = |time_s: f64| path.camera(&stage.scene, &stage.scene.pose(time_s));
+    for viewers in [1, 4, 16] {
+        println!("{viewers} apart\n| | ms a step | server's | PSNR | SSIM | bias, % |");
+        let cameras: Vec<_> =
+            (0..viewers).map(|i| at((stage.time_s + f64::from(i) * 0.618_034 * seconds) % seconds)).collect();
+        play(&stage, viewers as usize, (30, 3, 128), &|_, viewer| cameras[viewer]);
+        println!("{viewers} in one place\n| | ms a step | server's | PSNR | SSIM | bias, % |");
+        let turned = |viewer: usize| {
+            let mut camera = at(stage.time_s);
+            let turn = Affine3A::from_rotation_y((viewer as f32).to_radians());
+            camera.world_from_view.matrix3 = turn.matrix3 * camera.world_from_view.matrix3;
+            camera
+        };
+        play(&stage, viewers as usize, (30, 3, 128), &|_, viewer| turned(viewer));
     }
 }

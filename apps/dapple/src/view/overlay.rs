@@ -13,7 +13,7 @@ use dapple_session::Role;
 const PANEL_WIDTH: f32 = 240.0;
 
 /// Every key and what it does.
-pub(super) const KEYS: [(&str, &str); 17] = [
+pub(super) const KEYS: [(&str, &str); 18] = [
     ("drag", "turn; on foot: look around"),
     ("right drag, Shift drag", "move sideways"),
     ("wheel", "come closer, go back"),

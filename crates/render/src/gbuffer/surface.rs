@@ -90,13 +90,6 @@ impl GBuffer {
         Some(Found::new(scene, sample)?.geometric_normal(&corners, Mat3::from(world_from_mesh.matrix3)))
     }
 
-    /// [`Surface::position_world`] alone, cheaper; `None` as in [`GBuffer::surface`].
-    pub(crate) fn position_world(&self, scene: &Scene, pose: &Pose, sample_index: usize) -> Option<Vec3> {
-        let sample = self.samples.get(sample_index).filter(|s| s.is_covered())?;
-        let corners = world_triangle(scene, pose, sample.instance as usize, sample.triangle as usize)?;
-        Some(blend(corners, Found::new(scene, sample)?.weights))
-    }
-
     /// Parts of a vector along the first edge of the posed triangle that a sample sees, and in its plane across that (towards the third
     /// corner); `None` as in [`GBuffer::surface`], and where the triangle has collapsed.
     pub(crate) fn lean(

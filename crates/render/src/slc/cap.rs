@@ -195,6 +195,7 @@ impl<'a> Lens<'a> {
     }
 
     /// Puts a cone's directions into the lanes.
+    #[allow(clippy::needless_range_loop)] // several lists of lanes at once
     fn spread<const N: usize>(&mut self, cap: &Cap, ground: &Ground, part: f32, pattern: &Pattern<N>) {
         if self.used + N > LANES || self.count == WAITING {
             self.flush();
@@ -249,6 +250,7 @@ impl<'a> Lens<'a> {
         (self.used, self.count) = (0, 0);
     }
 
+    #[allow(clippy::needless_range_loop)] // several lists of lanes at once
     fn flush_matte(&mut self) {
         let Lanes { x, y, z, diffuse: cosines, waiting, .. } = &mut *self.lanes;
         let (n, s) = (self.point.normal_world, self.point.normal_shading_world);
@@ -269,6 +271,7 @@ impl<'a> Lens<'a> {
     }
 
     /// Schlick's fifth power f splits reflectance into three sums over directions: n·l (1 − f), D V n·l (1 − f), D V n·l f.
+    #[allow(clippy::needless_range_loop)] // several lists of lanes at once
     fn flush_glossy(&mut self) {
         let Lanes { x, y, z, diffuse, gloss, grazing, waiting } = &mut *self.lanes;
         let (n, s, v) =
@@ -290,8 +293,8 @@ impl<'a> Lens<'a> {
                 let vl = v.x * x + v.y * y + v.z * z;
                 // h = (v + l) / |v + l|, |v + l|² = 2 + 2 v·l.
                 let reciprocal = 1.0 / (2.0 + 2.0 * vl).max(1e-6).sqrt();
-                let vh = ((1.0 + vl) * reciprocal).max(0.0).min(1.0);
-                let nh = ((nv_signed + nl_signed) * reciprocal).max(0.0).min(1.0);
+                let vh = ((1.0 + vl) * reciprocal).clamp(0.0, 1.0);
+                let nh = ((nv_signed + nl_signed) * reciprocal).clamp(0.0, 1.0);
                 let miss = 1.0 - vh;
                 let f5 = (miss * miss) * (miss * miss) * miss;
                 let f = (1.0 - nh) * (1.0 + nh) + nh * nh * a2;

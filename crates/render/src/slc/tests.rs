@@ -41,17 +41,18 @@ fn ratio(samples: u32) -> SlcShading {
 
 /// A cap of radiance 1 as the entry of a place with that normal keeps it: its irradiance, of what is above the horizon, by sums.
 fn cap(direction: Vec3, angle: f32, normal: Vec3) -> Cap {
-    let (mut sum, mut count) = (0.0f64, 0);
+    let (mut sum, mut count, mut open) = (0.0f64, 0, 0);
     each_direction(direction, angle, |w| {
         sum += f64::from(normal.dot(w).max(0.0));
         count += 1;
+        open += i32::from(normal.dot(w) > 0.0);
     });
     let solid_angle = TAU * (1.0 - angle.cos());
     Cap {
         direction,
         cos_angle: angle.cos(),
         energy: Vec3::splat((sum / f64::from(count)) as f32 * solid_angle),
-        mean_cosine: (sum / f64::from(count)) as f32,
+        mean_cosine: (sum / f64::from(open.max(1))) as f32,
     }
 }
 

@@ -67,7 +67,7 @@ pub(super) fn lights_within(
         for index in changed.drain(kept..) {
             wanted[index] = values[index];
         }
-        let Some(last) = changed.last() else { return None };
+        let last = changed.last()?;
         *next = last + 1;
         bytes = bytes_of(&wanted);
     }

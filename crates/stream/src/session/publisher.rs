@@ -370,7 +370,7 @@ impl State {
         epoch: u64,
         (store, cuts): (&PointStore, Cuts),
         change: &SetsChange,
-        exact: Option<([Precision; PLANES], &[(u32, u8)])>,
+        exact: Option<Exactness<'_>>,
     ) -> (Frame, usize) {
         let added = PointStore::default().carried(store.layout().only(&change.added).into(), store);
         let cuts = cuts.only(&change.added);
@@ -398,6 +398,9 @@ impl State {
         (Frame::new(FrameKind::Sets, self.group, epoch, &payload), changed)
     }
 }
+
+/// How far off each plane may be, and values of lights ([`Spending::light_tolerances`]).
+type Exactness<'a> = ([Precision; PLANES], &'a [(u32, u8)]);
 
 /// A delta that can be sent.
 struct Delta {

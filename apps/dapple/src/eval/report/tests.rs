@@ -14,8 +14,8 @@ use tempfile::TempDir;
 use super::pictures::{BUDGET_BYTES, order_in, spread};
 use super::results::{
     Advice, Case, Figure, FrameRow, JudgeInfo, Machine, Params, Results, Row, RunInfo, SCHEMA, SceneInfo,
-    Settling, Steps, StudyAxis, StudyColumn, StudyLine, StudyPlot, StudyResult, StudyRow, StudyTable, Times,
-    Truth, TruthFrame,
+    Settling, Steps, StudyAxis, StudyColumn, StudyLine, StudyPicture, StudyPlot, StudyResult, StudyRow,
+    StudyTable, Times, Truth, TruthFrame,
 };
 use super::{columns, html, html_within, rebuild, words};
 

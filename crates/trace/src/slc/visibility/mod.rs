@@ -55,9 +55,10 @@ pub struct VisibilityCounts {
     pub rays: u64,
 }
 
-impl VisibilityCounts {
-    /// Both together.
-    pub fn add(self, other: VisibilityCounts) -> VisibilityCounts {
+impl std::ops::Add for VisibilityCounts {
+    type Output = VisibilityCounts;
+
+    fn add(self, other: VisibilityCounts) -> VisibilityCounts {
         VisibilityCounts {
             traced: self.traced + other.traced,
             changed: self.changed + other.changed,
@@ -87,7 +88,7 @@ pub fn trace_visibility(
     let mut counts = VisibilityCounts::default();
     for (light, plane) in values.chunks_mut(layout.len().max(1)).enumerate() {
         let found = trace_light(sites, (light, lights), tracer, params, |_, _| true);
-        counts = found.iter().fold(counts, |sum, chunk| sum.add(chunk.1));
+        counts = found.iter().fold(counts, |sum, chunk| sum + chunk.1);
         let mut found = found.iter().flat_map(|chunk| &chunk.0).peekable();
         let mut last = OPEN;
         for (point, value) in plane.iter_mut().enumerate() {
@@ -151,7 +152,7 @@ fn trace_due(
         let before = values.of_light(light as u32);
         let start = light * values.points();
         for (list, chunk) in &found {
-            counts = counts.add(*chunk);
+            counts = counts + *chunk;
             for &(point, new) in list {
                 if let Some(&old) = before.get(point).filter(|old| **old != new) {
                     changed.push(LightChange { index: (start + point) as u32, old, new });
