@@ -192,11 +192,11 @@ fn lights_are_dimmed_by_what_points_see_of_them() {
 #[test]
 fn triangles_smaller_than_texels_read_one_of_their_vertices() {
     let mut stage = stage();
-    // Charts of one triangle each would be more than there are vertices.
+    // So rough that few triangles share a chart: they would have more texels than there are vertices.
     for (i, position) in stage.scene.meshes[1].positions.iter_mut().enumerate() {
-        *position *= if i % 2 == 0 { 0.9 } else { 1.1 };
+        *position *= 1.0 + 0.1 * (i * i * 7 % 11 % 3) as f32;
     }
-    let Some((atlas, _, mut bench)) = dimmed(&stage, 0.6) else { return };
+    let Some((atlas, _, mut bench)) = dimmed(&stage, 0.4) else { return };
     let is_fine = |instance: u32| atlas.charts(instance).is_some_and(|charts| charts.is_per_vertex());
     assert!(is_fine(1), "the ball has texels at its vertices");
     let (twin, gbuffer) = lit_twin(&stage, &dim(), Some(&atlas));
