@@ -60,6 +60,7 @@ fn html_within(results: &Results, folder: &Path, picture_bytes: usize) -> Result
     fill(&[
         ("title", &escape(&results.title)),
         ("style", &STYLE.join("\n")),
+        ("body_class", if is_of_studies(results) { " class=\"of-studies\"" } else { "" }),
         ("lead", &words::lead(results)),
         ("headlines", &words::headlines(results)),
         ("advice", &words::advice(results)),
@@ -74,6 +75,11 @@ fn html_within(results: &Results, folder: &Path, picture_bytes: usize) -> Result
         ("scripts", &scripts),
         ("pictures", &embedded.elements),
     ])
+}
+
+/// Whether there are studies, and no cases.
+fn is_of_studies(results: &Results) -> bool {
+    results.cases.is_empty() && !results.studies.is_empty()
 }
 
 /// Puts values in the places that the page names; what values look like does not matter.

@@ -337,6 +337,9 @@ fn the_summary_says_what_is_best_and_by_how_much() {
         lead(&two)
     );
     assert!(lead(&results(vec![])).starts_with("Nothing was compared"));
+    let studies = Results { studies: vec![study("radius")], ..results(vec![]) };
+    assert!(lead(&studies).starts_with("Studies alone"));
+    assert!(html(&studies, Path::new("")).unwrap().contains("<body class=\"of-studies\">"));
     assert!(
         lead(&results(vec![case("a", vec![row("a", "none", None, &[14.0])])])).contains("without a stream")
     );

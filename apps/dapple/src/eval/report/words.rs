@@ -103,6 +103,7 @@ pub(super) fn lead(results: &Results) -> String {
         .filter_map(|(case, settings)| Some((case, headline(case, settings)?)))
         .collect();
     match headlines.as_slice() {
+        [] if super::is_of_studies(results) => "Studies alone: what each of them found is below.".to_owned(),
         [] => "Nothing was compared: no row has a pixel that shows geometry.".to_owned(),
         [(_, one)] => lead_of_one(one),
         many => lead_of_many(many),
