@@ -140,12 +140,12 @@ pub enum DecodeError {
 }
 
 /// Maps small differences of either sign, modulo 256, to small bytes.
-fn zigzag(difference: u8) -> u8 {
+pub(crate) fn zigzag(difference: u8) -> u8 {
     let d = difference as i8;
     ((d << 1) ^ (d >> 7)) as u8
 }
 
 /// The inverse of [`zigzag`].
-fn unzigzag(code: u8) -> u8 {
+pub(crate) fn unzigzag(code: u8) -> u8 {
     (code >> 1) ^ (code & 1).wrapping_neg()
 }

@@ -137,6 +137,9 @@ fn check_fit(
     if decoded.extras.lights != store.light_count() {
         return bad("have values of more or fewer lights than others have");
     }
+    if decoded.extras.has_leans != Extras::of(store).has_leans {
+        return bad("say where what is seen of lights lies where others do not, or do not where others do");
+    }
     if added.sets().is_empty() {
         return bad("are none");
     }

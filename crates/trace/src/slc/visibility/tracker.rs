@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use dapple_scene::area_lights::AreaLights;
 use dapple_scene::{Pose, Scene};
-use dapple_store::light_visibility::{LightVisibility, LightVisibilityError, OPEN};
+use dapple_store::light_visibility::{Lean, LightVisibility, LightVisibilityError, OPEN};
 use dapple_store::points::{PointLayout, PointStore};
 use rayon::prelude::*;
 
@@ -40,6 +40,8 @@ pub struct LightTracker {
     layout: Arc<PointLayout>,
     /// Of the points, at the moment of the last step.
     sites: Vec<Option<Site>>,
+    /// Which points lie on something glossy; none where nothing of the scene is.
+    glossy: Vec<bool>,
     values: LightVisibility,
     /// Which values are to be found again, one each.
     is_due: Vec<bool>,
@@ -67,12 +69,15 @@ impl LightTracker {
     ) -> Result<LightTracker, LightVisibilityError> {
         let sites = sites_world(layout, anchors, scene, pose);
         let lights = AreaLights::new(scene, pose);
-        let (values, first) = trace_visibility(layout, &sites, tracer, &lights, &params.visibility)?;
+        let glossy = glossy(scene, layout, anchors);
+        let (values, first) =
+            trace_visibility(layout, (&sites, &glossy), tracer, &lights, &params.visibility)?;
         let is_due = vec![false; values.values().len()];
         let mut tracker = LightTracker {
             params,
             layout: layout.clone(),
             sites,
+            glossy,
             values,
             is_due,
             due: 0,
@@ -113,7 +118,9 @@ impl LightTracker {
     pub fn bytes(&self) -> usize {
         self.sites.capacity() * size_of::<Option<Site>>()
             + self.is_due.capacity()
+            + self.glossy.capacity()
             + self.values.values().len()
+            + size_of_val(self.values.leans())
     }
 
     /// All values as all rays would find them now, at the pose of the last step: [`LightTracker::values`] where nothing is due.
@@ -126,7 +133,7 @@ impl LightTracker {
         let lights = AreaLights::new(scene, pose);
         let mut values = self.values.clone();
         let params = &self.params.visibility;
-        let (_, counts) = super::retrace_visibility(&mut values, &self.sites, tracer, &lights, params);
+        let (_, counts) = super::retrace_visibility(&mut values, (&self.sites, &self.glossy), tracer, &lights, params);
         (values, counts)
     }
 
@@ -147,6 +154,12 @@ impl LightTracker {
         let lights = AreaLights::new(scene, pose);
         // Refuses what is too much.
         let open = LightVisibility::open(layout, self.values.lights())?;
+        let open = if self.values.has_leans() {
+            let none = vec![Lean::NONE; open.values().len()];
+            open.with_leans(none)?
+        } else {
+            open
+        };
         let store = |layout: &Arc<PointLayout>, values| {
             PointStore::new(layout.clone(), vec![0; layout.len()]).and_then(|store| store.with_lights(values))
         };
@@ -175,6 +188,7 @@ impl LightTracker {
             }
         }
         (self.sites, self.values) = (sites_world(layout, anchors, scene, pose), values);
+        self.glossy = glossy(scene, layout, anchors);
         (self.layout, self.is_due, self.next) = (layout.clone(), is_due, 0);
         self.due = self.is_due.iter().filter(|due| **due).count();
         let mut counts = VisibilityCounts::default();
@@ -262,9 +276,9 @@ impl LightTracker {
         for (index, value, rays) in self.find(list, tracer, lights) {
             (self.is_due[index], self.due) = (false, self.due - 1);
             counts.rays += rays;
-            let Some(new) = value else { continue };
+            let Some((new, lean)) = value else { continue };
             counts.traced += 1;
-            counts.changed += u64::from(self.values.set(index, new));
+            counts.changed += u64::from(self.values.set(index, new, lean));
         }
     }
 
@@ -274,7 +288,7 @@ impl LightTracker {
         list: &[usize],
         tracer: &Tracer,
         lights: &AreaLights<'_>,
-    ) -> Vec<(usize, Option<u8>, u64)> {
+    ) -> Vec<(usize, Option<(u8, Lean)>, u64)> {
         let points = self.layout.len();
         let chunk = |list: &[usize]| {
             let mut worker = Worker::default();
@@ -282,8 +296,10 @@ impl LightTracker {
                 let (light, mut rays) = (index / points, 0);
                 let site = self.sites[index % points].as_ref().filter(|site| is_usable(site));
                 let site = site.filter(|s| lights.arriving(light, s.position_world, s.normal_world) > 0.0);
+                let wants_lean = self.glossy.get(index % points) == Some(&true);
+                let params = &self.params.visibility;
                 let value = site.and_then(|site| {
-                    worker.value(tracer, (light, lights), site, &self.params.visibility, &mut rays)
+                    worker.value(tracer, (light, lights), (site, wants_lean), params, &mut rays)
                 });
                 (index, value, rays)
             };
@@ -320,4 +336,27 @@ impl LightTracker {
         };
         (0..self.values.lights() as usize).map(of).sum()
     }
+}
+
+/// Roughness up to which a surface mirrors enough of a light for one to see which part of it is hidden.
+const GLOSSY_ROUGHNESS: f32 = 0.5;
+
+/// Which points lie on something glossy; none if nothing of the scene is, whichever points there are.
+fn glossy(scene: &Scene, layout: &PointLayout, anchors: &[Anchor]) -> Vec<bool> {
+    let materials: Vec<bool> = scene.materials.iter().map(|m| m.roughness_factor <= GLOSSY_ROUGHNESS).collect();
+    if !materials.contains(&true) {
+        return Vec::new();
+    }
+    let mut found = Vec::with_capacity(layout.len());
+    for set in layout.sets() {
+        let mesh = &scene.meshes[scene.instances[set.instance as usize].mesh as usize];
+        let is_glossy = |anchor: &Anchor| {
+            let holds = |part: &&dapple_scene::Part| {
+                (part.first_triangle..part.first_triangle + part.triangle_count).contains(&anchor.triangle())
+            };
+            mesh.parts.iter().find(holds).is_some_and(|part| materials[part.material as usize])
+        };
+        found.extend(anchors[set.first as usize..][..set.len()].iter().map(is_glossy));
+    }
+    found
 }
