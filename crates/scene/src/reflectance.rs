@@ -56,6 +56,11 @@ impl ShadingPoint {
         }
         self.reflectance.reflected(self.normal_shading_world, self.to_viewer_world, to_light_world) * cosine
     }
+
+    /// What of the radiance that leaves towards the viewer is reflected: all but what it emits itself, never below 0.
+    pub fn reflected_of(&self, radiance: Vec3) -> Vec3 {
+        (radiance - self.emitted).max(Vec3::ZERO)
+    }
 }
 
 impl Reflectance {

@@ -9,10 +9,7 @@ use dapple_store::points::{CellGrid, PointLayout, PointStore};
 use dapple_stream::{Limits, Publisher, PublisherConfig, Spending, Subscriber};
 use dapple_trace::psao::generate::{GenerateParams, GeneratedPoints, generate_points};
 use dapple_trace::rtao::Site;
-use dapple_trace::slc::{
-    Changes, Moment, VisibilityCounts, VisibilityParams, VisibleError, retrace_visibility, trace_visibility,
-    update_visibility, value_tolerances,
-};
+use dapple_trace::slc::{LightTracker, TrackerParams, VisibilityCounts, VisibilityParams};
 use dapple_trace::{Tracer, offset_origin};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -45,6 +42,11 @@ impl World {
         let (points, between) = (lay(goal, 0), lay(4000, 99));
         World { scene, points, between }
     }
+}
+
+fn tracker(world: &World, pose: &Pose, tracer: &Tracer, params: TrackerParams) -> LightTracker {
+    let points = (&world.points.layout, &world.points.anchors[..]);
+    LightTracker::new(&world.scene, pose, tracer, points, params).unwrap()
 }
 
 /// A store of points that are all open, with these values of lights: what comes of visibility itself costs nothing.
@@ -172,14 +174,13 @@ fn play(
     let (scene, layout) = (&world.scene, &world.points.layout);
     let mut pose = scene.pose(start_s);
     let mut tracer = Tracer::new(scene, &pose);
-    let mut sites = world.points.sites_world(scene, &pose);
-    let first = AreaLights::new(scene, &pose);
-    let mut run = Run { points: layout.len(), lights: first.len(), ..Run::default() };
-    let (mut values, _) = trace_visibility(layout, &sites, &tracer, &first, params).unwrap();
+    let lights = TrackerParams { visibility: *params, tolerance: relative };
+    let mut tracker = tracker(world, &pose, &tracer, lights);
+    let mut run = Run { points: layout.len(), lights: tracker.values().lights() as usize, ..Run::default() };
     let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
     let open = PointStore::new(layout.clone(), vec![255; layout.len()]).unwrap();
     let without = publisher.publish(&open).unwrap().bytes.len();
-    let joined = publisher.publish(&lit(layout, &values)).unwrap().bytes;
+    let joined = publisher.publish(&lit(layout, tracker.values())).unwrap().bytes;
     run.join_bytes = joined.len() - without;
     let mut client = Subscriber::new(None, Limits::default());
     client.receive(&joined).unwrap();
@@ -187,21 +188,15 @@ fn play(
     error((scene, &pose, &tracer), &world.between.sites_world(scene, &pose), &mut range, &|_, _, _| {
         Some(1.0)
     });
-    let tolerated = VisibleError { relative, floor: 0.02 * range.unwrap() };
     let mut looks = 0.0;
     for frame in 1..=(seconds * HZ) as u32 {
         let now = scene.pose(start_s + f64::from(frame) / HZ);
         let begun = std::time::Instant::now();
         tracer.update(scene, &now);
-        sites = world.points.sites_world(scene, &now);
-        let [then_lights, now_lights] = [&pose, &now].map(|pose| AreaLights::new(scene, pose));
-        let then = Moment { scene, pose: &pose, lights: &then_lights };
-        let changes = Changes::between(&then, &Moment { scene, pose: &now, lights: &now_lights });
-        let (_, counts) = update_visibility(&mut values, (layout, &sites), &tracer, &changes, params);
-        let tolerances = value_tolerances(&values, &sites, &now_lights, &tolerated);
-        let tolerances: Vec<(u32, u8)> = (0..).zip(tolerances).collect();
+        let counts = tracker.step(scene, &now, &tracer, &world.points.anchors, None);
+        let tolerances = tracker.tolerances(client.lights().unwrap(), scene, &now);
         let spending = Spending { light_tolerances: &tolerances, ..Spending::default() };
-        let sent = publisher.publish_within(&lit(layout, &values), &spending);
+        let sent = publisher.publish_within(&lit(layout, tracker.values()), &spending);
         run.step_s += begun.elapsed().as_secs_f64();
         if let Some(sent) = sent {
             client.receive(&sent.bytes).unwrap();
@@ -220,8 +215,9 @@ fn play(
             let lights = AreaLights::new(scene, &pose);
             let posed = (scene, &pose, &tracer);
             let places = world.between.sites_world(scene, &pose);
+            let sites = world.points.sites_world(scene, &pose);
             let grid = CellGrid::new(&positions(&sites), 1.6 * layout.spacing_m());
-            for (i, held) in [&values, client.lights().unwrap()].into_iter().enumerate() {
+            for (i, held) in [tracker.values(), client.lights().unwrap()].into_iter().enumerate() {
                 let at = |point: usize, _: &Site, light: usize| held.fraction(point, light as u32);
                 run.at_points[i] += error(posed, &sites, &mut range, &at).powi(2);
                 run.between[i] +=
@@ -233,10 +229,8 @@ fn play(
         *sum = (*sum / f64::max(looks, 1.0)).sqrt();
     }
     // What an update left alone is what all rays together say.
-    let lights = AreaLights::new(scene, &pose);
-    let mut again = values.clone();
-    let (missed, _) = retrace_visibility(&mut again, &sites, &tracer, &lights, params);
-    assert_eq!(missed, []);
+    let (fresh, _) = tracker.traced_afresh(scene, &pose, &tracer);
+    assert!(&fresh == tracker.values());
     run
 }
 
@@ -250,20 +244,16 @@ fn a_client_sees_what_the_server_traced_and_a_still_scene_sends_nothing() {
     let still = World::new("atrium-lamps", 0.05, 1500);
     // Nothing in front of a lamp moves while nothing moves.
     let pose = still.scene.pose(2.0);
-    let lights = AreaLights::new(&still.scene, &pose);
-    let moment = Moment { scene: &still.scene, pose: &pose, lights: &lights };
     let tracer = Tracer::new(&still.scene, &pose);
-    let sites = still.points.sites_world(&still.scene, &pose);
     let layout = &still.points.layout;
-    let params = VisibilityParams::default();
-    let (mut values, counts) = trace_visibility(layout, &sites, &tracer, &lights, &params).unwrap();
-    assert!(counts.traced > 0 && values.values().iter().any(|v| *v > 0 && *v < OPEN));
+    let mut tracker = tracker(&still, &pose, &tracer, TrackerParams::default());
+    let values = tracker.values().values();
+    assert!(tracker.first_counts().traced > 0 && values.iter().any(|v| *v > 0 && *v < OPEN));
     let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
-    publisher.publish(&lit(layout, &values)).unwrap();
-    let nothing = Changes::between(&moment, &moment);
-    let (changes, counts) = update_visibility(&mut values, (layout, &sites), &tracer, &nothing, &params);
-    assert_eq!((changes.len(), counts), (0, VisibilityCounts::default()));
-    assert!(publisher.publish(&lit(layout, &values)).is_none());
+    publisher.publish(&lit(layout, tracker.values())).unwrap();
+    let counts = tracker.step(&still.scene, &pose, &tracer, &still.points.anchors, None);
+    assert_eq!(counts, VisibilityCounts::default());
+    assert!(publisher.publish(&lit(layout, tracker.values())).is_none());
 }
 
 #[test]

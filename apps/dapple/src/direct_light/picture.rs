@@ -84,7 +84,7 @@ pub(crate) fn add(
         if step + 1 == steps {
             for ((direct, lit), point) in drawn.shaded.direct.iter_mut().zip(&found).zip(&seen[0].points) {
                 if let Some(point) = point {
-                    *direct += (*lit - point.emitted).max(Vec3::ZERO);
+                    *direct += point.reflected_of(*lit);
                 }
             }
         }

@@ -230,8 +230,7 @@ impl<'a> Stage<'a> {
         let counts = trace_direct(&self.tracer_at(drawn), &lights, &points, params, &mut radiance);
         // What surfaces emit is drawn already.
         for (radiance, point) in radiance.iter_mut().zip(&points) {
-            *radiance =
-                point.as_ref().map_or(Vec3::ZERO, |point| (*radiance - point.emitted).max(Vec3::ZERO));
+            *radiance = point.as_ref().map_or(Vec3::ZERO, |point| point.reflected_of(*radiance));
         }
         (radiance, counts.rays)
     }

@@ -8,6 +8,7 @@ use dapple_render::area_lights::AreaLightTable;
 use dapple_render::forward::{AtlasBand, ForwardError, GpuScene};
 use dapple_render::psao::atlas::{AtlasParams, DirtyBand, PointChange, VisibilityAtlas};
 use dapple_scene::area_lights::AreaLights;
+use dapple_scene::glam::Affine3A;
 use dapple_scene::{Pose, Scene};
 use dapple_stream::{Applied, ReceiveError, ValueChange};
 
@@ -21,13 +22,15 @@ pub(super) struct Light {
     pub(super) received: Received,
     pub(super) atlas: Option<VisibilityAtlas>,
     pub(super) inspection: Inspection,
-    /// Lights that the scene has, and whether any of them is skinned or morphs.
-    scene_lights: u32,
+    /// Instances that are lights, and whether any of them is skinned or morphs.
+    emitters: Vec<u32>,
     do_lights_deform: bool,
     /// Lights whose visibility the atlas has.
     lights: u32,
     /// Whether area lights lie on the card.
     is_lit: bool,
+    /// What lies there, and where the emitters were.
+    drawn_lights: Option<(Vec<Affine3A>, AreaLightTable)>,
     /// Whether what lies on the card is of another atlas.
     is_new: bool,
     /// When the running fade began, seconds; long ago if none runs.
@@ -43,18 +46,19 @@ pub(super) struct Light {
 impl Light {
     pub(super) fn new(scene: Arc<Scene>, received: Received) -> Light {
         let inspection = Inspection::default();
-        let (scene_lights, do_lights_deform) = {
+        let emitters: Vec<u32> = {
             let lights = AreaLights::new(&scene, &scene.pose_undeformed(0.0));
-            let deforms = |instance: u32| {
-                let instance = &scene.instances[instance as usize];
-                instance.skin.is_some() || !scene.meshes[instance.mesh as usize].morph_targets.is_empty()
-            };
-            let deform = (0..lights.len()).filter_map(|light| lights.instance(light)).any(deforms);
-            (lights.len() as u32, deform)
+            (0..lights.len()).filter_map(|light| lights.instance(light)).collect()
         };
+        let deforms = |instance: &u32| {
+            let instance = &scene.instances[*instance as usize];
+            instance.skin.is_some() || !scene.meshes[instance.mesh as usize].morph_targets.is_empty()
+        };
+        let do_lights_deform = emitters.iter().any(deforms);
         Light {
-            scene_lights,
+            emitters,
             do_lights_deform,
+            drawn_lights: None,
             lights_problem: None,
             scene,
             received,
@@ -109,7 +113,7 @@ impl Light {
     fn take_lights(&mut self, applied: &Applied) {
         let (Some(atlas), Some(store)) = (&mut self.atlas, self.received.store()) else { return };
         // Values of other lights than the scene's tell nothing, and could be of any number of them.
-        let lights = store.lights().filter(|lights| lights.lights() == self.scene_lights);
+        let lights = store.lights().filter(|lights| lights.lights() as usize == self.emitters.len());
         let count = lights.map_or(0, |lights| lights.lights());
         if std::mem::replace(&mut self.lights, count) != count {
             // Others than before: what was taken in is of no use.
@@ -228,18 +232,26 @@ impl Light {
         let is_lit = wanted && self.lights > 0 && is_fine;
         if !is_lit && self.is_lit {
             gpu_scene.set_area_lights(gpu, &AreaLightTable::default());
+            self.drawn_lights = None;
         }
         self.is_lit = is_lit;
         let Some(atlas) = self.atlas.as_mut().filter(|_| is_lit) else { return };
-        let table = AreaLightTable::new(&AreaLights::new(&self.scene, pose));
-        atlas.show_lights(table.lights());
+        let placed = |instance: &u32| pose.instances[*instance as usize].world_from_mesh;
+        let places: Vec<Affine3A> = self.emitters.iter().map(placed).collect();
+        let stand_still = |(before, _): &(Vec<Affine3A>, _)| !self.do_lights_deform && *before == places;
+        if !self.drawn_lights.as_ref().is_some_and(stand_still) {
+            let table = AreaLightTable::new(&AreaLights::new(&self.scene, pose));
+            gpu_scene.set_area_lights(gpu, &table);
+            self.drawn_lights = Some((places, table));
+        }
+        let shown = self.drawn_lights.as_ref().map_or(&[][..], |(_, table)| table.lights());
+        atlas.show_lights(shown);
         let bands = bands_of(atlas.take_dirty_lights());
         if !bands.is_empty() {
             let groups: Vec<_> = atlas.light_texels().iter().map(Vec::as_slice).collect();
             let uploaded = gpu_scene.upload_lights(gpu, atlas.side(), &groups, &bands);
             self.lights_problem = uploaded.err().map(|error| format!("area lights: {error}"));
         }
-        gpu_scene.set_area_lights(gpu, &table);
     }
 }
 

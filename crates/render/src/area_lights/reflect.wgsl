@@ -1,4 +1,4 @@
-// Light of area lights, dimmed by how much of each is seen, as a surface reflects it. The twins are `area_lights` and `slc::cap`.
+// Light of area lights, dimmed by how much of each is seen, as a surface reflects it. The twins are `area_lights` and its `gloss`.
 
 @group(2) @binding(6) var area_atlas: texture_2d_array<f32>;
 @group(2) @binding(7) var area_table: texture_2d<f32>;

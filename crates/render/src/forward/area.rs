@@ -4,6 +4,7 @@ use dapple_gpu::{Gpu, wgpu};
 
 use super::ForwardError;
 use super::atlas::{AtlasBand, AtlasTexture};
+use super::tables::{float_table, write_rows};
 use crate::area_lights::table::TABLE_WIDTH;
 use crate::area_lights::{AreaLightTable, MAX_AREA_LIGHTS};
 use crate::psao::atlas::LIGHTS_A_TEXEL;
@@ -58,30 +59,11 @@ impl AreaLightTextures {
         let changed: Vec<usize> =
             (0..self.lights as usize).filter(|row| is_first || has_changed(*row)).collect();
         if let (Some(first), Some(last)) = (changed.first(), changed.last()) {
-            self.write_rows(gpu, &rows, *first, last + 1);
+            let range = first * TABLE_WIDTH..(last + 1) * TABLE_WIDTH;
+            write_rows(gpu, &self.table, *first as u32, &rows[range]);
         }
         self.rows = rows;
         is_first
-    }
-
-    fn write_rows(&self, gpu: &Gpu, rows: &[[f32; 4]], first: usize, end: usize) {
-        gpu.queue.write_texture(
-            wgpu::TexelCopyTextureInfo {
-                origin: wgpu::Origin3d { x: 0, y: first as u32, z: 0 },
-                ..self.table.as_image_copy()
-            },
-            bytemuck::cast_slice(&rows[first * TABLE_WIDTH..end * TABLE_WIDTH]),
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some((TABLE_WIDTH * size_of::<[f32; 4]>()) as u32),
-                rows_per_image: None,
-            },
-            wgpu::Extent3d {
-                width: TABLE_WIDTH as u32,
-                height: (end - first) as u32,
-                depth_or_array_layers: 1,
-            },
-        );
     }
 
     /// Writes bands of the layers of all groups; returns whether groups must be made anew.
@@ -149,16 +131,7 @@ impl AreaLightTextures {
 }
 
 fn make_table(gpu: &Gpu, width: u32, height: u32) -> (wgpu::Texture, wgpu::TextureView) {
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("area lights"),
-        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Rgba32Float,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-        view_formats: &[],
-    });
+    let texture = float_table(gpu, "area lights", width, height);
     let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
     (texture, view)
 }

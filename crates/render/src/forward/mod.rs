@@ -16,6 +16,7 @@ mod pipelines;
 mod points;
 mod scene;
 mod shadow;
+mod tables;
 #[cfg(test)]
 mod tests;
 mod uniforms;

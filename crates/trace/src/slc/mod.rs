@@ -28,8 +28,7 @@ pub use changes::{Changes, Moment};
 pub use paper::PaperParams;
 pub use places::{EntryPlace, EntryPlaces};
 pub use visibility::{
-    LightTracker, TrackerParams, VisibilityCounts, VisibilityParams, VisibleError, retrace_visibility,
-    trace_visibility, update_visibility, value_tolerances,
+    LightTracker, TrackerParams, VisibilityCounts, VisibilityParams, retrace_visibility, trace_visibility,
 };
 
 /// Most samples of an entry in one update.

@@ -5,6 +5,7 @@ use dapple_gpu::{Gpu, wgpu};
 use dapple_scene::{Mesh, Pose, Scene};
 
 use super::super::ForwardError;
+use super::super::tables::{float_table, write_rows};
 use super::super::uniforms::{DEFORM_WIDTH, POSE_WIDTH, RIGID, rows};
 
 /// Texel numbers are handed on as floats, which are exact up to here.
@@ -162,16 +163,7 @@ fn push_displacements(mesh: &Mesh, texels: &mut Vec<[f32; 4]>) -> usize {
 
 fn make(gpu: &Gpu, label: &str, width: u32, texels: usize) -> wgpu::Texture {
     let height = (texels as u32).div_ceil(width).max(1);
-    gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(label),
-        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Rgba32Float,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-        view_formats: &[],
-    })
+    float_table(gpu, label, width, height)
 }
 
 /// Writes texels from the first on, whole rows. The list keeps its length.
@@ -182,11 +174,6 @@ fn write(gpu: &Gpu, texture: &wgpu::Texture, width: u32, texels: &mut Vec<[f32; 
         return;
     }
     texels.resize(rows as usize * width as usize, [0.0; 4]);
-    gpu.queue.write_texture(
-        texture.as_image_copy(),
-        bytemuck::cast_slice(texels.as_slice()),
-        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(16 * width), rows_per_image: None },
-        wgpu::Extent3d { width, height: rows, depth_or_array_layers: 1 },
-    );
+    write_rows(gpu, texture, 0, texels);
     texels.truncate(len);
 }

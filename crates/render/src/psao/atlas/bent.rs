@@ -1,12 +1,10 @@
 //! Bent normals in the atlas: sums of rest-space directions, by the weights of visibility, beside the texels that are shown.
 
 use dapple_scene::{Pose, Scene};
-use dapple_store::charts::TEXEL_FRACTION;
 use dapple_store::points::{BentChange, BentNormal, BentPlanes, PackedNormal, PointSet};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::lights::nearest_texel;
 use super::resolve::PointTexels;
 use super::{ReadySet, SetState, VisibilityAtlas};
 use crate::gbuffer::GBuffer;
@@ -96,33 +94,9 @@ impl VisibilityAtlas {
         back: bool,
     ) -> Option<Vec3> {
         let ready = self.ready_set(instance)?;
-        let charts = &ready.charts;
-        let corners = charts.corners().get(triangle as usize)?;
         let bent = ready.bent.as_ref()?;
-        // The back's texels follow the front's.
-        let is_back = back && bent.sums.len() > charts.texel_count() as usize;
-        let first = if is_back { charts.texel_count() } else { 0 };
-        let texel = |page: usize, x: u32, y: u32| bent.at(first + nearest_texel(charts, page, x, y));
-        let sum = if charts.is_per_vertex() {
-            let [b, c] = barycentrics;
-            let [va, vb, vc] = corners.map(|uv| {
-                let at = |at: u16| u32::from(at / TEXEL_FRACTION);
-                texel(usize::from(uv.page), at(uv.x), at(uv.y))
-            });
-            va + (vb - va) * b + (vc - va) * c
-        } else {
-            let (page, x, y) = charts.texel_at(triangle as usize, barycentrics);
-            let split = |at: f32| {
-                let at = (at - 0.5).max(0.0);
-                (at as u32, at.fract())
-            };
-            let ((x, fx), (y, fy)) = (split(x), split(y));
-            let row = |y: u32| {
-                let page = usize::from(page);
-                texel(page, x, y).lerp(texel(page, x + 1, y), fx)
-            };
-            row(y).lerp(row(y + 1), fy)
-        };
+        let mix = ready.mix(triangle, barycentrics, back)?;
+        let sum: Vec3 = mix.texels().iter().map(|&(texel, weight)| bent.at(texel) * weight).sum();
         sum.try_normalize()
     }
 

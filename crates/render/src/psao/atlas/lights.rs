@@ -1,11 +1,12 @@
 //! Visibility of lights in the atlas: of each light a sum for each texel, by the weights of visibility.
 
-use dapple_store::charts::{ChartSet, TEXEL_FRACTION, WEIGHT_SUM};
+use dapple_store::charts::WEIGHT_SUM;
 use dapple_store::light_visibility::{LightChange, LightVisibility, OPEN};
 use dapple_store::points::PointSet;
 use rayon::prelude::*;
 
 use super::light_texels::{LIGHTS_A_TEXEL, LightTexels};
+use super::mix::Mix;
 use super::resolve::PointTexels;
 use super::{DirtyBand, ReadySet, SetState, VisibilityAtlas};
 use crate::gbuffer::Sample;
@@ -73,51 +74,13 @@ fn value_of(sum: u16) -> u8 {
     ((u32::from(sum) * 255 + open / 2) / open) as u8
 }
 
-/// Up to four texels of a set and how much each counts at a place.
-struct Mix {
-    texels: [(u32, f32); 4],
-    count: usize,
-}
-
-impl ReadySet {
-    /// What a place of a triangle reads, as a card does it.
-    fn mix(&self, triangle: u32, barycentrics: [f32; 2], back: bool) -> Option<Mix> {
-        let charts = &*self.charts;
-        let corners = charts.corners().get(triangle as usize)?;
-        // The back's texels follow the front's.
-        let is_back = back && self.sums.len() > charts.texel_count() as usize;
-        let first = if is_back { charts.texel_count() } else { 0 };
-        let texel = |page: u16, x: u32, y: u32| first + nearest_texel(charts, usize::from(page), x, y);
-        if charts.is_per_vertex() {
-            let [b, c] = barycentrics;
-            let whole = |at: u16| u32::from(at / TEXEL_FRACTION);
-            let [ta, tb, tc] = corners.map(|uv| texel(uv.page, whole(uv.x), whole(uv.y)));
-            return Some(Mix { texels: [(ta, 1.0 - b - c), (tb, b), (tc, c), (ta, 0.0)], count: 3 });
-        }
-        let (page, x, y) = charts.texel_at(triangle as usize, barycentrics);
-        let split = |at: f32| {
-            let at = (at - 0.5).max(0.0);
-            (at as u32, at.fract())
-        };
-        let ((x, fx), (y, fy)) = (split(x), split(y));
-        let texels = [
-            (texel(page, x, y), (1.0 - fx) * (1.0 - fy)),
-            (texel(page, x + 1, y), fx * (1.0 - fy)),
-            (texel(page, x, y + 1), (1.0 - fx) * fy),
-            (texel(page, x + 1, y + 1), fx * fy),
-        ];
-        Some(Mix { texels, count: 4 })
+/// Visible fraction of a light where these texels are mixed; `None` if there is no such light.
+fn fraction(mix: &Mix, lights: &LightSums, light: u32) -> Option<f32> {
+    let mut sum = 0.0;
+    for &(texel, weight) in mix.texels() {
+        sum += f32::from(lights.at(light, texel)?) * weight;
     }
-}
-
-impl Mix {
-    fn fraction(&self, lights: &LightSums, light: u32) -> Option<f32> {
-        let mut sum = 0.0;
-        for &(texel, weight) in &self.texels[..self.count] {
-            sum += f32::from(lights.at(light, texel)?) * weight;
-        }
-        Some((sum / 255.0).clamp(0.0, 1.0))
-    }
+    Some((sum / 255.0).clamp(0.0, 1.0))
 }
 
 impl VisibilityAtlas {
@@ -228,7 +191,7 @@ impl VisibilityAtlas {
         light: u32,
     ) -> Option<f32> {
         let ready = self.ready_set(instance)?;
-        ready.mix(triangle, barycentrics, back)?.fraction(ready.lights.as_ref()?, light)
+        fraction(&ready.mix(triangle, barycentrics, back)?, ready.lights.as_ref()?, light)
     }
 
     /// How much of each of some lights a sample sees, 0 … 1, into `fractions`, one for each of `lights`; 1 where nothing is known of it.
@@ -243,8 +206,8 @@ impl VisibilityAtlas {
         let Some(mix) = ready.mix(sample.triangle, sample.barycentrics, sample.is_back_face()) else {
             return;
         };
-        for (fraction, light) in fractions.iter_mut().zip(lights) {
-            *fraction = mix.fraction(sums, *light).unwrap_or(1.0);
+        for (shown, light) in fractions.iter_mut().zip(lights) {
+            *shown = fraction(&mix, sums, *light).unwrap_or(1.0);
         }
     }
 }
@@ -257,11 +220,4 @@ fn show(texels: &mut LightTexels, state: &SetState) {
             ready.lights.as_ref()?.at(light, texel)
         });
     }
-}
-
-/// Number of a texel of a page, the nearest one that there is.
-pub(super) fn nearest_texel(charts: &ChartSet, page: usize, x: u32, y: u32) -> u32 {
-    let size = charts.pages()[page];
-    let within = |at: u32, size: u16| at.min(u32::from(size).saturating_sub(1));
-    charts.first_texel_of_page(page) + within(y, size.height) * u32::from(size.width) + within(x, size.width)
 }

@@ -7,6 +7,7 @@ mod bent;
 mod job;
 mod light_texels;
 mod lights;
+mod mix;
 mod pages;
 mod resolve;
 mod sets;

@@ -18,7 +18,6 @@ use std::f32::consts::PI;
 
 pub use tracker::{LightTracker, TrackerParams};
 
-use super::{Changes, Moment};
 use crate::bvh::{MAX_DIRECTIONS, Tracer, offset_origin};
 use crate::direct::{Draws, Sequence};
 use crate::rtao::Site;
@@ -92,7 +91,7 @@ pub fn trace_visibility(
     let mut leans = if glossy.is_empty() { Vec::new() } else { vec![Lean::NONE; values.len()] };
     let mut counts = VisibilityCounts::default();
     for (light, plane) in values.chunks_mut(layout.len().max(1)).enumerate() {
-        let found = trace_light(sites, (light, lights), tracer, params, |_, _| true);
+        let found = trace_light(sites, (light, lights), tracer, params);
         counts = found.iter().fold(counts, |sum, chunk| sum + chunk.1);
         let mut found = found.iter().flat_map(|chunk| &chunk.0).peekable();
         let mut last = OPEN;
@@ -106,31 +105,6 @@ pub fn trace_visibility(
     Ok((LightVisibility::new(layout, count, values)?, counts))
 }
 
-/// Finds again what may be another than at the moment before: lights that moved, lights that something may have moved in front of or away from,
-/// and points that moved. What a light does not reach stays. Gives the changes, which `values` has already.
-///
-/// `sites` are of the present moment. Values of another layout or other lights are the caller's mistake; what has no place is left out.
-pub fn update_visibility(
-    values: &mut LightVisibility,
-    (layout, sites): (&PointLayout, &[Option<Site>]),
-    tracer: &Tracer,
-    changes: &Changes<'_>,
-    params: &VisibilityParams,
-) -> (Vec<LightChange>, VisibilityCounts) {
-    if changes.is_nothing() {
-        return (Vec::new(), VisibilityCounts::default());
-    }
-    let mut has_moved = vec![false; layout.len()];
-    for set in layout.sets() {
-        let first = set.first as usize;
-        has_moved[first..first + set.len()].fill(changes.has_moved(set.instance));
-    }
-    let is_due = |light: usize, point: usize, site: &Site| {
-        has_moved.get(point) == Some(&true) || changes.may_show(light, site.position_world, site.normal_world)
-    };
-    trace_due(values, sites, (tracer, changes.lights()), params, is_due)
-}
-
 /// Finds all values again, whatever changed; what a light does not reach stays. Gives the changes, which `values` has already.
 pub fn retrace_visibility(
     values: &mut LightVisibility,
@@ -139,21 +113,9 @@ pub fn retrace_visibility(
     lights: &AreaLights<'_>,
     params: &VisibilityParams,
 ) -> (Vec<LightChange>, VisibilityCounts) {
-    trace_due(values, sites, (tracer, lights), params, |_, _, _| true)
-}
-
-/// Finds what is due: of which light, at which point.
-fn trace_due(
-    values: &mut LightVisibility,
-    sites: &[Option<Site>],
-    (tracer, lights): (&Tracer, &AreaLights<'_>),
-    params: &VisibilityParams,
-    is_due: impl Fn(usize, usize, &Site) -> bool + Sync,
-) -> (Vec<LightChange>, VisibilityCounts) {
     let (mut changed, mut counts) = (Vec::new(), VisibilityCounts::default());
     for light in 0..lights.len().min(values.lights() as usize) {
-        let found =
-            trace_light(sites, (light, lights), tracer, params, |point, site| is_due(light, point, site));
+        let found = trace_light(sites, (light, lights), tracer, params);
         let before = values.of_light(light as u32);
         let start = light * values.points();
         for (list, chunk) in &found {
@@ -176,13 +138,12 @@ fn trace_due(
 /// What one task found: points, their values and leans, in order.
 type Found = (Vec<(usize, u8, Lean)>, VisibilityCounts);
 
-/// Values of one light at those points that it reaches and that are due.
+/// Values of one light at those points that it reaches.
 fn trace_light(
     (sites, glossy): (&[Option<Site>], &[bool]),
     (light, lights): (usize, &AreaLights<'_>),
     tracer: &Tracer,
     params: &VisibilityParams,
-    is_due: impl Fn(usize, &Site) -> bool + Sync,
 ) -> Vec<Found> {
     let chunk = |(chunk, sites): (usize, &[Option<Site>])| {
         let (mut list, mut counts) = (Vec::new(), VisibilityCounts::default());
@@ -190,7 +151,7 @@ fn trace_light(
         for (i, site) in sites.iter().enumerate() {
             let point = chunk * CHUNK + i;
             let Some(site) = site.as_ref().filter(|site| is_usable(site)) else { continue };
-            if lights.arriving(light, site.position_world, site.normal_world) <= 0.0 || !is_due(point, site) {
+            if lights.arriving(light, site.position_world, site.normal_world) <= 0.0 {
                 continue;
             }
             let wants_lean = glossy.get(point) == Some(&true);
@@ -306,58 +267,4 @@ impl Directions {
         let offset = (seen - all) / sine;
         Lean::quantized(lean_frame(all).map(|across| across.dot(offset)))
     }
-}
-
-/// From which error on one sees that a value is not the right one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct VisibleError {
-    /// Share of the irradiance at a point, ≥ 0, default 0.1.
-    pub relative: f32,
-    /// Irradiance (luminance, W/m²) that is added to that at a point before the share is taken, ≥ 0, default 0: what is small against it is as
-    /// good as black.
-    pub floor: f32,
-}
-
-impl Default for VisibleError {
-    fn default() -> Self {
-        VisibleError { relative: 0.1, floor: 0.0 }
-    }
-}
-
-impl VisibleError {
-    /// By how many steps the value of a light may be off at a point of this irradiance, where the light would give `arriving`; 255 where it does not
-    /// matter.
-    fn steps(&self, irradiance: f32, arriving: f32) -> u8 {
-        let may = f32::from(OPEN) * self.relative * (irradiance + self.floor);
-        if arriving > 0.0 { (may / arriving).clamp(0.0, 255.0) as u8 } else { 255 }
-    }
-}
-
-/// By how many steps each value may be off before the error is seen, light by light as the values are; 255 where its light does not matter.
-pub fn value_tolerances(
-    values: &LightVisibility,
-    sites: &[Option<Site>],
-    lights: &AreaLights<'_>,
-    error: &VisibleError,
-) -> Vec<u8> {
-    let (points, count) = (values.points(), values.lights() as usize);
-    let arriving = |light: usize, point: usize| {
-        let site = sites.get(point).and_then(|site| site.as_ref()).filter(|site| is_usable(site));
-        site.map_or(0.0, |site| lights.arriving(light, site.position_world, site.normal_world))
-    };
-    let steps = f32::from(OPEN);
-    let irradiance: Vec<f32> = (0..points)
-        .into_par_iter()
-        .map(|point| {
-            let of = |light: usize| {
-                arriving(light, point) * f32::from(values.of_light(light as u32)[point]) / steps
-            };
-            (0..count).map(of).sum()
-        })
-        .collect();
-    let tolerance = |index: usize| {
-        let (light, point) = (index / points, index % points);
-        error.steps(irradiance[point], arriving(light, point))
-    };
-    (0..points * count).into_par_iter().map(tolerance).collect()
 }

@@ -7,7 +7,7 @@ use dapple_scene::{EmitterShape, Material, Mesh, Pose, PosedInstance, Scene};
 use dapple_store::points::{PackedNormal, PointSet, morton_code};
 
 use super::*;
-use crate::slc::Moment;
+use crate::psao::generate::{Anchor, sites_world};
 use crate::test_support::{quad, scene as placed, sphere};
 
 /// A floor of 8 m with 20 × 20 points, a shutter (instance 1), and lights over it.
@@ -15,7 +15,18 @@ struct Rig {
     scene: Scene,
     pose: Pose,
     layout: Arc<PointLayout>,
+    anchors: Vec<Anchor>,
     sites: Vec<Option<Site>>,
+}
+
+/// On the floor's first triangle or its second.
+fn anchor(place: Vec3) -> Anchor {
+    let (across, along) = (place.x / 8.0 + 0.5, 0.5 - place.z / 8.0);
+    if across >= along {
+        Anchor::new(0, [across - along, along], false)
+    } else {
+        Anchor::new(1, [across, along - across], false)
+    }
 }
 
 fn flat(half: f32, height: f32) -> Mesh {
@@ -45,14 +56,14 @@ impl Rig {
         let mut positions: Vec<[u32; 3]> = (0..400).map(|i| [i % 20 * 8, 0, i / 20 * 8]).collect();
         positions.sort_by_key(|position| morton_code(*position));
         let place = |p: &[u32; 3]| Vec3::new(p[0] as f32, 0.0, p[2] as f32) * 0.05 - Vec3::new(3.8, 0.0, 3.8);
-        let sites = (0u64..)
-            .zip(&positions)
-            .map(|(key, p)| Some(Site { position_world: place(p), normal_world: Vec3::Y, key }));
-        let sites = sites.collect();
+        let anchors: Vec<Anchor> = positions.iter().map(|p| anchor(place(p))).collect();
         let normals = vec![PackedNormal::pack(Vec3::Y); 400];
         let set = PointSet { positions, normals, ..PointSet::default() };
         let layout = Arc::new(PointLayout::new(0.05, 0.4, vec![set]).unwrap());
-        Rig { scene, pose, layout, sites }
+        let sites = sites_world(&layout, &anchors, &scene, &pose);
+        let off = |(site, p): (&Option<Site>, _)| site.as_ref().unwrap().position_world.distance(place(p));
+        assert!(sites.iter().zip(&layout.sets()[0].positions).all(|pair| off(pair) < 1e-3));
+        Rig { scene, pose, layout, anchors, sites }
     }
 
     fn trace(&self, pose: &Pose, params: &VisibilityParams) -> (LightVisibility, VisibilityCounts) {
@@ -60,18 +71,15 @@ impl Rig {
         trace_visibility(&self.layout, &self.sites, &tracer, &lights, params).unwrap()
     }
 
-    fn update(
-        &self,
-        values: &mut LightVisibility,
-        before: &Pose,
-        now: &Pose,
-    ) -> (Vec<LightChange>, VisibilityCounts) {
-        let tracer = Tracer::new(&self.scene, now);
-        let [then, lights] = [before, now].map(|pose| AreaLights::new(&self.scene, pose));
-        let then = Moment { scene: &self.scene, pose: before, lights: &then };
-        let changes = Changes::between(&then, &Moment { scene: &self.scene, pose: now, lights: &lights });
-        let params = VisibilityParams::default();
-        update_visibility(values, (&self.layout, &self.sites), &tracer, &changes, &params)
+    fn tracker(&self, tolerance: f32, visibility: VisibilityParams) -> LightTracker {
+        let tracer = Tracer::new(&self.scene, &self.pose);
+        let params = TrackerParams { visibility, tolerance };
+        let points = (&self.layout, &self.anchors[..]);
+        LightTracker::new(&self.scene, &self.pose, &tracer, points, params).unwrap()
+    }
+
+    fn step(&self, tracker: &mut LightTracker, now: &Pose) -> VisibilityCounts {
+        tracker.step(&self.scene, now, &Tracer::new(&self.scene, now), &self.anchors, None)
     }
 
     fn moved(&self, instance: usize, world: Affine3A) -> Pose {
@@ -133,8 +141,9 @@ fn an_update_finds_what_all_rays_find() {
     let rig =
         Rig::new(shifted(-3.0, 1.0), vec![lamp(0.2, 0.0, 2.5), lamp(0.1, 2.0, 1.5), lamp(0.3, 30.0, 5.0)]);
     let params = VisibilityParams::default();
-    let (mut values, _) = rig.trace(&rig.pose, &params);
-    let mut before = rig.pose.clone();
+    let mut tracker = rig.tracker(0.1, params);
+    let (values, counts) = rig.trace(&rig.pose, &params);
+    assert_eq!((tracker.values(), tracker.first_counts()), (&values, counts));
     let (mut least, mut most) = (u64::MAX, 0);
     for step in 1..=12 {
         let mut now = rig.moved(1, shifted(-3.0 + 0.4 * step as f32, 1.0));
@@ -144,19 +153,16 @@ fn an_update_finds_what_all_rays_find() {
         if step == 10 {
             now.instances[3] = PosedInstance::REMOVED;
         }
-        let old = values.clone();
-        let (changes, counts) = rig.update(&mut values, &before, &now);
+        let before = tracker.values().clone();
+        let counts = rig.step(&mut tracker, &now);
         let whole = rig.trace(&now, &params).0;
         let there: Vec<u32> = if step == 10 { vec![0, 2] } else { vec![0, 1, 2] };
         for light in there {
-            assert_eq!(values.of_light(light), whole.of_light(light), "step {step}, light {light}");
+            assert_eq!(tracker.values().of_light(light), whole.of_light(light), "step {step}, light {light}");
         }
-        let mut again = old;
-        again.apply(&changes).unwrap();
-        assert_eq!(again, values);
-        assert_eq!(counts.changed, changes.len() as u64);
+        let differ = before.values().iter().zip(tracker.values().values()).filter(|(a, b)| a != b).count();
+        assert_eq!((counts.changed, tracker.due()), (differ as u64, 0));
         (least, most) = (least.min(counts.traced), most.max(counts.traced));
-        before = now;
     }
     assert!(least < 600 && most < 1200, "{least} to {most} of 1200 pairs were looked at");
 }
@@ -164,35 +170,45 @@ fn an_update_finds_what_all_rays_find() {
 #[test]
 fn what_nothing_happens_to_takes_no_rays_and_a_lamp_in_the_open_sends_nothing() {
     let rig = Rig::new(shifted(0.0, -1.0), vec![lamp(0.2, -1.0, 2.0), lamp(0.1, 1.5, 2.0)]);
-    let (mut values, _) = rig.trace(&rig.pose, &VisibilityParams::default());
-    let (changes, counts) = rig.update(&mut values, &rig.pose, &rig.pose);
-    assert_eq!((changes.len(), counts), (0, VisibilityCounts::default()));
+    let mut tracker = rig.tracker(0.1, VisibilityParams::default());
+    assert_eq!(rig.step(&mut tracker, &rig.pose), VisibilityCounts::default());
     // One lamp moves, and the other is nowhere behind it.
-    let now = rig.moved(2, shifted(-0.7, 2.0));
-    let (changes, counts) = rig.update(&mut values, &rig.pose, &now);
-    assert!(counts.traced >= 400, "{counts:?}");
-    assert_eq!(changes, []);
+    let counts = rig.step(&mut tracker, &rig.moved(2, shifted(-0.7, 2.0)));
+    assert!(counts.traced >= 400 && counts.changed == 0, "{counts:?}");
 }
 
 #[test]
 fn tolerances_follow_what_is_seen_of_an_error() {
     let rig = Rig::new(shifted(0.0, 1.0), vec![lamp(0.1, 0.0, 2.0), lamp(0.1, 3.0, 0.5)]);
-    let (values, _) = rig.trace(&rig.pose, &VisibilityParams::default());
     let lights = AreaLights::new(&rig.scene, &rig.pose);
-    let at = |error: VisibleError| value_tolerances(&values, &rig.sites, &lights, &error);
-    let relative = at(VisibleError { relative: 0.1, floor: 0.0 });
-    assert_eq!(relative.len(), 800);
-    for (index, tolerance) in relative.iter().enumerate() {
-        let site = rig.sites[index % 400].as_ref().unwrap();
+    // Every value differs from its opposite.
+    let at = |tracker: &LightTracker| {
+        let opposite = tracker.values().values().iter().map(|value| OPEN - value).collect();
+        let held = LightVisibility::new(&rig.layout, 2, opposite).unwrap();
+        tracker.tolerances(&held, &rig.scene, &rig.pose)
+    };
+    let tracker = rig.tracker(0.1, VisibilityParams::default());
+    let (values, found) = (tracker.values(), at(&tracker));
+    assert_eq!(tracker.tolerances(values, &rig.scene, &rig.pose), []);
+    assert!(found.iter().map(|pair| pair.0).eq(0..800));
+    let bright = |point: usize| {
+        let site = rig.sites[point].as_ref().unwrap();
         let most = |light| lights.arriving(light, site.position_world, site.normal_world);
-        let has: f32 = (0..2).map(|l| most(l) * values.fraction(index % 400, l as u32).unwrap()).sum();
-        let off = most(index / 400) * (f32::from(*tolerance) + 1.0) / 31.0;
-        assert!(off > 0.1 * has * 0.999, "one step more would be seen");
-        assert!(*tolerance == 255 || f32::from(*tolerance) / 31.0 * most(index / 400) <= 0.1001 * has);
+        let has: f32 = (0..2).map(|l| most(l) * values.fraction(point, l as u32).unwrap()).sum();
+        (has, [most(0), most(1)])
+    };
+    let brightest = (0..400).map(|point| bright(point).0).fold(0.0, f32::max);
+    assert!(tracker.black > 0.0 && tracker.black <= 0.02 * brightest);
+    for &(index, tolerance) in &found {
+        let (has, most) = bright(index as usize % 400);
+        let (most, may) = (most[index as usize / 400], 0.1 * (has + tracker.black));
+        let off = most * (f32::from(tolerance) + 1.0) / 31.0;
+        assert!(tolerance == 255 || off > may * 0.999, "one step more would be seen");
+        assert!(tolerance == 255 || f32::from(tolerance) / 31.0 * most <= may * 1.001);
     }
-    let none = at(VisibleError { relative: 0.0, floor: 1.0 });
-    assert!(none.iter().all(|t| *t == 0));
-    assert!(at(VisibleError { relative: 0.1, floor: 1e30 }).iter().all(|t| *t == 255));
+    let none = at(&rig.tracker(0.0, VisibilityParams::default()));
+    assert!(none.iter().all(|(_, t)| *t == 0));
+    assert!(at(&rig.tracker(1e30, VisibilityParams::default())).iter().all(|(_, t)| *t == 255));
 }
 
 #[test]
@@ -204,20 +220,17 @@ fn no_light_and_no_number_breaks_it() {
             let rig =
                 Rig::new(shifted(0.0, 0.5), EmitterShape::NAMES.map(|(_, shape)| light(shape)).to_vec());
             let params = VisibilityParams { rays: u32::MAX, first: 0, seed: 1 };
-            let (values, _) = rig.trace(&rig.pose, &params);
-            let error = VisibleError { relative: f32::NAN, floor: f32::INFINITY };
-            let lights = AreaLights::new(&rig.scene, &rig.pose);
-            assert_eq!(value_tolerances(&values, &rig.sites, &lights, &error).len(), values.values().len());
+            let mut tracker = rig.tracker(f32::NAN, params);
+            rig.step(&mut tracker, &rig.moved(2, shifted(0.1, f32::MAX)));
+            let held = LightVisibility::open(&rig.layout, tracker.values().lights()).unwrap();
+            tracker.tolerances(&held, &rig.scene, &rig.pose);
         }
     }
     let mut rig = Rig::new(shifted(0.0, 0.5), vec![lamp(0.1, 0.0, 2.0)]);
     rig.sites[3] = None;
     rig.sites[4].as_mut().unwrap().normal_world = Vec3::splat(f32::NAN);
-    let (mut values, counts) =
-        rig.trace(&rig.pose, &VisibilityParams { rays: 0, ..VisibilityParams::default() });
+    let (_, counts) = rig.trace(&rig.pose, &VisibilityParams { rays: 0, ..VisibilityParams::default() });
     assert_eq!((counts.traced, counts.rays), (398, 398));
-    let now = rig.moved(2, shifted(0.1, 2.0));
-    assert!(rig.update(&mut values, &rig.pose, &now).1.traced <= 398);
 }
 
 #[test]

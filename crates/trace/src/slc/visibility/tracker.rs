@@ -8,11 +8,9 @@ use dapple_store::light_visibility::{Lean, LightVisibility, LightVisibilityError
 use dapple_store::points::{PointLayout, PointStore};
 use rayon::prelude::*;
 
-use super::{
-    CHUNK, Changes, Moment, VisibilityCounts, VisibilityParams, VisibleError, Worker, is_usable,
-    trace_visibility,
-};
+use super::{CHUNK, VisibilityCounts, VisibilityParams, Worker, is_usable, trace_visibility};
 use crate::psao::generate::{Anchor, sites_world};
+use crate::slc::{Changes, Moment};
 use crate::{Tracer, rtao::Site};
 
 /// How visibility of lights is kept.
@@ -52,7 +50,9 @@ pub struct LightTracker {
     next: usize,
     /// The scene as it was at the last step.
     before: Pose,
-    black: f32,
+    /// Irradiance (luminance, W/m²) that is added to a point's before the share of its tolerance is taken: what is small against it is as good as
+    /// black.
+    pub(super) black: f32,
 }
 
 impl LightTracker {
@@ -312,16 +312,18 @@ impl LightTracker {
     /// `pose` is that of the last step.
     pub fn tolerances(&self, held: &LightVisibility, scene: &Scene, pose: &Pose) -> Vec<(u32, u8)> {
         let lights = AreaLights::new(scene, pose);
-        let error = VisibleError { relative: self.params.tolerance, floor: self.black };
         let pairs = held.values().par_iter().zip(self.values.values()).enumerate();
         let differ = pairs.filter(|(_, (held, new))| held != new);
-        let steps = |(index, _): (usize, _)| (index as u32, self.tolerance(index, &lights, &error));
+        let steps = |(index, _): (usize, _)| (index as u32, self.tolerance(index, &lights));
         differ.map(steps).collect()
     }
 
-    fn tolerance(&self, index: usize, lights: &AreaLights<'_>, error: &VisibleError) -> u8 {
+    /// By how many steps a value may be off; 255 where its light does not matter.
+    fn tolerance(&self, index: usize, lights: &AreaLights<'_>) -> u8 {
         let (light, point) = (index / self.layout.len(), index % self.layout.len());
-        error.steps(self.irradiance(lights, point), self.arriving(lights, light, point))
+        let may = f32::from(OPEN) * self.params.tolerance * (self.irradiance(lights, point) + self.black);
+        let arriving = self.arriving(lights, light, point);
+        if arriving > 0.0 { (may / arriving).clamp(0.0, 255.0) as u8 } else { 255 }
     }
 
     fn arriving(&self, lights: &AreaLights<'_>, light: usize, point: usize) -> f32 {
