@@ -215,9 +215,9 @@ impl Client {
         let points = shading_points(scene, pose, camera, gbuffer, shade.specular);
         let store = self.subscriber.store().filter(|store| store.lights().is_some());
         let atlas = store.map(|store| self.atlas_of(store));
-        shade_area_lights(&points, &table, |sample, fractions| match atlas {
-            Some(atlas) => atlas.look_up_lights(&gbuffer.samples()[sample], table.lights(), fractions),
-            None => fractions.fill(1.0),
+        shade_area_lights(&points, &table, |sample, seen| match atlas {
+            Some(atlas) => atlas.look_up_lights(&gbuffer.samples()[sample], table.lights(), seen),
+            None => seen.fill(SeenLight::ALL),
         })
     }
 

@@ -8,7 +8,7 @@ mod random;
 
 use common::same_bits;
 use dapple_store::charts::{Cuts, SetCuts, SiteCut};
-use dapple_store::light_visibility::{LightChange, OPEN};
+use dapple_store::light_visibility::{Lean, LightChange, OPEN};
 use dapple_store::points::{BentChange, BentNormal, Change, PointLayout, PointStore};
 use dapple_stream::{
     Applied, Frame, FrameKind, IgnoreReason, Limits, Precision, Publisher, PublisherConfig, ReceiveError,
@@ -82,7 +82,10 @@ fn change(store: &mut PointStore, changes: &[(prop::sample::Index, u8)]) {
         let dim = |change: &Change| {
             let index = change.point as usize * 7 % values;
             let new = change.visibility % (OPEN + 1);
-            LightChange { index: index as u32, old: lights.values()[index], new }
+            let new_lean = Lean([(change.visibility % 9) as i8 - 4, 2]).of_value(new);
+            let (old, old_lean) = (lights.values()[index], lights.lean(index));
+            let new_lean = if lights.has_leans() { new_lean } else { Lean::NONE };
+            LightChange { index: index as u32, old, new, old_lean, new_lean }
         };
         let dimmed: Vec<LightChange> = changes.iter().map(dim).collect();
         store.apply_lights(&dimmed).unwrap();

@@ -165,7 +165,7 @@ fn the_light_vectors_are_those_of_the_encoder_and_decode() {
     let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
     let mut subscriber = Subscriber::new(None, Limits::default());
     let snapshot = publisher.publish(&store).unwrap();
-    let change = |index, old, new| LightChange { index, old, new };
+    let change = |index, old, new| LightChange { index, old, new, ..LightChange::default() };
     let changes = [change(1, 31, 25), change(2, 20, 0), change(6, 31, 0)];
     store.apply_lights(&changes).unwrap();
     let delta = publisher.publish(&store).unwrap();

@@ -200,7 +200,7 @@ impl<'a> Stage<'a> {
         let open_light = self.settings.has_area_lights().then(|| {
             let points = shading_points(scene, &drawn.pose, &camera, &drawn.gbuffer, self.shade().specular);
             let table = AreaLightTable::new(&AreaLights::new(scene, &drawn.pose));
-            shade_area_lights(&points, &table, |_, fractions| fractions.fill(1.0))
+            shade_area_lights(&points, &table, |_, seen| seen.fill(SeenLight::ALL))
         });
         let reflected = open_light.as_ref().map(|_| {
             let params = DirectParams {

@@ -248,8 +248,8 @@ impl Light {
         atlas.show_lights(shown);
         let bands = bands_of(atlas.take_dirty_lights());
         if !bands.is_empty() {
-            let groups: Vec<_> = atlas.light_texels().iter().map(Vec::as_slice).collect();
-            let uploaded = gpu_scene.upload_lights(gpu, atlas.side(), &groups, &bands);
+            let planes: Vec<_> = atlas.light_texels().iter().map(Vec::as_slice).collect();
+            let uploaded = gpu_scene.upload_lights(gpu, atlas.side(), &planes, atlas.shows_leans(), &bands);
             self.lights_problem = uploaded.err().map(|error| format!("area lights: {error}"));
         }
     }

@@ -41,6 +41,25 @@ impl Lean {
     }
 }
 
+/// What is seen of a light from a place between points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeenLight {
+    /// Share of the irradiance that arrives, 0 … 1.
+    pub fraction: f32,
+    /// Where the middle of it lies, as [`Lean::radii`].
+    pub lean: [f32; 2],
+}
+
+impl SeenLight {
+    /// All of it.
+    pub const ALL: SeenLight = SeenLight::of(1.0);
+
+    /// A share of it, with no side.
+    pub const fn of(fraction: f32) -> SeenLight {
+        SeenLight { fraction, lean: [0.0; 2] }
+    }
+}
+
 /// Two unit vectors across a unit vector towards a light, which turn as little as can be while it turns: those across straight up, turned
 /// with it the shortest way. So points beside each other have nearly the same, but for those straight above a light.
 pub fn lean_frame(to_light: Vec3) -> [Vec3; 2] {
@@ -60,9 +79,13 @@ mod tests {
             let r = (1.0 - y * y).sqrt();
             let axis = Vec3::new(r * turn.cos(), y, r * turn.sin());
             let [a, b] = lean_frame(axis);
-            for (found, wanted) in
-                [(a.length(), 1.0), (b.length(), 1.0), (a.dot(axis), 0.0), (b.dot(axis), 0.0), (a.dot(b), 0.0)]
-            {
+            for (found, wanted) in [
+                (a.length(), 1.0),
+                (b.length(), 1.0),
+                (a.dot(axis), 0.0),
+                (b.dot(axis), 0.0),
+                (a.dot(b), 0.0),
+            ] {
                 assert!((found - wanted).abs() < 2e-3, "{axis}: {found}, {wanted}");
             }
             assert!(y < 0.0 || (a - lean_frame((axis + Vec3::X * 0.01).normalize())[0]).length() < 0.02);

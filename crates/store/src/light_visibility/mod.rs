@@ -6,7 +6,7 @@ mod lean;
 
 use crate::points::PointLayout;
 
-pub use lean::{LEAN_STEPS, Lean, lean_frame};
+pub use lean::{LEAN_STEPS, Lean, SeenLight, lean_frame};
 
 /// The value of a light of which all is seen; 0 is one of which nothing is.
 pub const OPEN: u8 = 31;
@@ -75,7 +75,9 @@ pub enum LightVisibilityError {
         value: u8,
     },
     /// Another number of leans than of values, one that is too far, or one of a value that has none.
-    #[error("visibility of lights: leans of {leans} values for {values}, the first that does not fit at {index}")]
+    #[error(
+        "visibility of lights: leans of {leans} values for {values}, the first that does not fit at {index}"
+    )]
     BadLeans {
         /// Leans given.
         leans: usize,
@@ -151,12 +153,7 @@ impl LightVisibility {
     }
 
     /// Values and leans (as many, or none at all) that were put together from others, so that each is in range.
-    pub(crate) fn carried(
-        points: usize,
-        lights: u32,
-        values: Vec<u8>,
-        leans: Vec<Lean>,
-    ) -> LightVisibility {
+    pub(crate) fn carried(points: usize, lights: u32, values: Vec<u8>, leans: Vec<Lean>) -> LightVisibility {
         debug_assert_eq!(values.len(), points * lights as usize);
         debug_assert!(leans.is_empty() || leans.len() == values.len());
         LightVisibility { points, lights, values, leans }
@@ -324,7 +321,8 @@ mod tests {
         assert_eq!((held.lean(1), held.lean(7), held.leans_of_light(1).len()), (some, none, 0));
         assert!(!held.set(1, 9, some) && held.set(1, 9, Lean([-4, 2])) && held.set(1, OPEN, some));
         assert_eq!(held.lean(1), none);
-        held.apply(&[LightChange { index: 0, new: 5, new_lean: Lean([9, 1]), ..LightChange::default() }]).unwrap();
+        held.apply(&[LightChange { index: 0, new: 5, new_lean: Lean([9, 1]), ..LightChange::default() }])
+            .unwrap();
         assert_eq!(held.lean(0), Lean([4, 1]));
     }
 

@@ -129,15 +129,16 @@ impl PointStore {
             let of = |light| carry(&|store| store.lights().map(|lights| lights.of_light(light)), OPEN);
             let values = (0..count).flat_map(of).collect();
             let has_leans = |store: &PointStore| store.lights().is_some_and(LightVisibility::has_leans);
-            let of = |light| {
-                let plane = |store: &PointStore| store.lights().map(|lights| lights.leans_of_light(light));
-                carry_plane((self, added), &layout, plane, Lean::NONE)
-            };
+            let of = |light| carry_plane((self, added), &layout, leans_of(light), Lean::NONE);
             let leans = if has_leans(self) || has_leans(added) { 0..count } else { 0..0 };
             Box::new(LightVisibility::carried(layout.len(), count, values, leans.flat_map(of).collect()))
         });
         PointStore { layout, visibility, bent, lights }
     }
+}
+
+fn leans_of<'a>(light: u32) -> impl Fn(&'a PointStore) -> Option<&'a [Lean]> {
+    move |store| store.lights().map(|lights| lights.leans_of_light(light))
 }
 
 /// A plane of `layout`: of each set what `added` has, else what `old` has, else this.

@@ -40,10 +40,8 @@ pub(crate) fn code_light_changes<'a, C: Coder>(
     let mut lights = 0;
     for light in 0..held.lights() {
         let first = light as usize * points;
-        let planes = |of: &'a LightVisibility| Planes {
-            values: of.of_light(light),
-            leans: of.leans_of_light(light),
-        };
+        let planes =
+            |of: &'a LightVisibility| Planes { values: of.of_light(light), leans: of.leans_of_light(light) };
         let (held, wanted) = (planes(held), wanted.map(planes));
         let is_coded =
             coder.bit(&mut chances.lights[lights & 3], wanted.is_some_and(|w| w.differs(&held, 0..points)));

@@ -388,8 +388,7 @@ impl State {
         if goals.is_some() || lights.is_some() {
             let goals = goals.unwrap_or_default();
             let State { near, store: held, fits, scratch, .. } = self;
-            let (bytes, changes) =
-                append_changes(payload, near, held, goals, lights.as_ref(), fits, scratch);
+            let (bytes, changes) = append_changes(payload, near, held, goals, lights.as_ref(), fits, scratch);
             apply(held, &changes).expect("changes are of points of the store");
             (payload, changed) = (bytes, changed + changes.visibility.len());
         }

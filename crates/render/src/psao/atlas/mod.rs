@@ -23,7 +23,7 @@ use dapple_store::charts::{AtlasError, ChartError, ChartSet, Cuts, InstanceKey, 
 use dapple_store::points::PointLayout;
 
 pub use dapple_store::charts::Placement;
-pub use light_texels::LIGHTS_A_TEXEL;
+pub use light_texels::{LIGHTS_A_TEXEL, PLANES_WITH_LEANS};
 pub use pages::{DirtyBand, MAX_LAYERS};
 pub use upload::TexelInfo;
 
@@ -107,6 +107,8 @@ pub struct VisibilityAtlas {
     failed: Vec<(u32, BuildError)>,
     /// Of lights that are shown on a card.
     light_texels: Option<LightTexels>,
+    /// Whether values of lights come with leans.
+    has_leans: bool,
 }
 
 /// Why an instance cannot be shown with its visibility.
@@ -180,6 +182,7 @@ impl VisibilityAtlas {
             fading: Vec::new(),
             failed: Vec::new(),
             light_texels: None,
+            has_leans: false,
             layout,
         };
         atlas.queue_open(scene);

@@ -91,18 +91,22 @@ pub fn trace_visibility(
     let mut leans = if glossy.is_empty() { Vec::new() } else { vec![Lean::NONE; values.len()] };
     let mut counts = VisibilityCounts::default();
     for (light, plane) in values.chunks_mut(layout.len().max(1)).enumerate() {
-        let found = trace_light(sites, (light, lights), tracer, params);
+        let found = trace_light((sites, glossy), (light, lights), tracer, params);
         counts = found.iter().fold(counts, |sum, chunk| sum + chunk.1);
         let mut found = found.iter().flat_map(|chunk| &chunk.0).peekable();
-        let mut last = OPEN;
+        let (mut last, first) = (OPEN, light * layout.len());
         for (point, value) in plane.iter_mut().enumerate() {
-            if let Some((_, new)) = found.next_if(|(at, _)| *at == point) {
+            if let Some((_, new, lean)) = found.next_if(|(at, ..)| *at == point) {
                 last = *new;
+                if let Some(held) = leans.get_mut(first + point) {
+                    *held = *lean;
+                }
             }
             *value = last;
         }
     }
-    Ok((LightVisibility::new(layout, count, values)?, counts))
+    let held = LightVisibility::new(layout, count, values)?;
+    Ok((if leans.is_empty() { held } else { held.with_leans(leans)? }, counts))
 }
 
 /// Finds all values again, whatever changed; what a light does not reach stays. Gives the changes, which `values` has already.
@@ -115,13 +119,15 @@ pub fn retrace_visibility(
 ) -> (Vec<LightChange>, VisibilityCounts) {
     let (mut changed, mut counts) = (Vec::new(), VisibilityCounts::default());
     for light in 0..lights.len().min(values.lights() as usize) {
-        let found = trace_light(sites, (light, lights), tracer, params);
+        let found = trace_light((sites, glossy), (light, lights), tracer, params);
         let before = values.of_light(light as u32);
         let start = light * values.points();
         for (list, chunk) in &found {
             counts = counts + *chunk;
             for &(point, new, new_lean) in list {
-                let (Some(&old), old_lean) = (before.get(point), values.lean(start + point)) else { continue };
+                let (Some(&old), old_lean) = (before.get(point), values.lean(start + point)) else {
+                    continue;
+                };
                 if old != new || old_lean != new_lean {
                     changed.push(LightChange { index: (start + point) as u32, old, new, old_lean, new_lean });
                 }
@@ -185,9 +191,10 @@ struct Directions {
     /// Of share × direction: of all, and of what is seen.
     all: Vec3,
     seen: Vec3,
-    /// Of solid angle.
+    /// Of solid angle: 1 / density.
     sr: f32,
-    count: u32,
+    /// Places that were drawn, those too that cannot be seen.
+    drawn: u32,
 }
 
 impl Worker {
@@ -221,10 +228,10 @@ impl Worker {
                     self.reaches.push(sample.reach());
                     self.shares.push(share);
                     self.directions.sr += 1.0 / sample.density_per_sr;
-                    self.directions.count += 1;
                     sent += 1;
                 }
             }
+            self.directions.drawn = next;
             let blocked = tracer.occlusion(origin, &self.reaches, 1.0);
             *rays += self.reaches.len() as u64;
             for (i, share) in self.shares.iter().enumerate() {
@@ -259,7 +266,7 @@ impl Directions {
             return Lean::NONE;
         };
         // 1 − cos of the cap's angle; of more than a hemisphere there is no side.
-        let depth = self.sr / self.count.max(1) as f32 / (2.0 * PI);
+        let depth = self.sr / self.drawn.max(1) as f32 / (2.0 * PI);
         let sine = (depth * (2.0 - depth)).sqrt();
         if !(depth > 0.0 && depth < 1.0) {
             return Lean::NONE;

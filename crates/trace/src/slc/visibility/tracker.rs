@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use dapple_scene::area_lights::AreaLights;
-use dapple_scene::{Pose, Scene};
+use dapple_scene::glam::Vec3;
+use dapple_scene::{Material, Part, Pose, Reflectance, Scene};
 use dapple_store::light_visibility::{Lean, LightVisibility, LightVisibilityError, OPEN};
 use dapple_store::points::{PointLayout, PointStore};
 use rayon::prelude::*;
@@ -133,7 +134,8 @@ impl LightTracker {
         let lights = AreaLights::new(scene, pose);
         let mut values = self.values.clone();
         let params = &self.params.visibility;
-        let (_, counts) = super::retrace_visibility(&mut values, (&self.sites, &self.glossy), tracer, &lights, params);
+        let (_, counts) =
+            super::retrace_visibility(&mut values, (&self.sites, &self.glossy), tracer, &lights, params);
         (values, counts)
     }
 
@@ -343,20 +345,26 @@ impl LightTracker {
 /// Roughness up to which a surface mirrors enough of a light for one to see which part of it is hidden.
 const GLOSSY_ROUGHNESS: f32 = 0.5;
 
-/// Which points lie on something glossy; none if nothing of the scene is, whichever points there are.
+/// Which points lie on something glossy; none if nothing of the scene may be, whichever points there are.
 fn glossy(scene: &Scene, layout: &PointLayout, anchors: &[Anchor]) -> Vec<bool> {
-    let materials: Vec<bool> = scene.materials.iter().map(|m| m.roughness_factor <= GLOSSY_ROUGHNESS).collect();
-    if !materials.contains(&true) {
+    let may_be =
+        |m: &Material| m.roughness_factor <= GLOSSY_ROUGHNESS || m.metallic_roughness_texture.is_some();
+    if !scene.materials.iter().any(may_be) {
         return Vec::new();
     }
     let mut found = Vec::with_capacity(layout.len());
     for set in layout.sets() {
         let mesh = &scene.meshes[scene.instances[set.instance as usize].mesh as usize];
         let is_glossy = |anchor: &Anchor| {
-            let holds = |part: &&dapple_scene::Part| {
-                (part.first_triangle..part.first_triangle + part.triangle_count).contains(&anchor.triangle())
+            let triangle = anchor.triangle();
+            let holds = |part: &&Part| {
+                (part.first_triangle..part.first_triangle + part.triangle_count).contains(&triangle)
             };
-            mesh.parts.iter().find(holds).is_some_and(|part| materials[part.material as usize])
+            let Some(part) = mesh.parts.iter().find(holds) else { return false };
+            let uv = [0, 1].map(|set| mesh.uv(set, triangle, anchor.barycentrics()));
+            let material = &scene.materials[part.material as usize];
+            let reflectance = Reflectance::of(scene, material, &uv, Vec3::ONE, true);
+            reflectance.alpha <= GLOSSY_ROUGHNESS * GLOSSY_ROUGHNESS
         };
         found.extend(anchors[set.first as usize..][..set.len()].iter().map(is_glossy));
     }
