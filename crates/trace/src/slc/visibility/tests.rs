@@ -111,7 +111,7 @@ fn shadows_are_where_they_must_be() {
         assert_eq!(rig.at(&values, 0, x, 0.2), expected, "at {x}");
     }
     // From afar: rays towards (9, 3) meet the shutter's height at (9 + 2 x) / 3, so x = −6 … −3 is shaded.
-    assert_eq!((rig.at(&values, 1, -3.4, 0.2), rig.at(&values, 1, -2.6, 0.2)), (0, OPEN));
+    assert_eq!((rig.at(&values, 1, -3.8, 0.2), rig.at(&values, 1, -2.2, 0.2)), (0, OPEN));
     // First rays that agree spare the others nearly everywhere.
     assert!(counts.rays < 6 * counts.traced, "{counts:?}");
     let all = VisibilityParams { first: 16, ..VisibilityParams::default() };
