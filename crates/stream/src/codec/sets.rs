@@ -10,7 +10,6 @@ use dapple_store::points::{MAX_POINTS, PointStore};
 use super::decode::{DecodedLayout, DeltaParts, decode_layout, decode_values};
 #[cfg(feature = "publish")]
 use super::encode::{append_values, encode_layout};
-#[cfg(feature = "publish")]
 use super::planes::Extras;
 use super::values::Near;
 #[cfg(feature = "publish")]
