@@ -247,7 +247,8 @@ fn complete(atlas: &mut VisibilityAtlas, scene: &Scene, store: &PointStore) {
     if let Some(lights) = store.lights()
         && lights.lights() as usize == AreaLights::new(scene, &scene.pose_undeformed(0.0)).len()
     {
-        atlas.resolve_lights(lights);
+        // Of more than fit nothing is known, as before the first snapshot.
+        let _ = atlas.resolve_lights(lights);
     }
 }
 

@@ -244,6 +244,11 @@ impl LightVisibility {
         Ok(())
     }
 
+    /// Bytes that values and leans take.
+    pub fn bytes(&self) -> usize {
+        self.values.len() + size_of_val(&self.leans[..])
+    }
+
     /// A hash of all that is held, the same on every machine: to compare ends (FNV-1a, 64 bits).
     pub fn hash(&self) -> u64 {
         let sizes = [self.points as u64, u64::from(self.lights)].map(u64::to_le_bytes);

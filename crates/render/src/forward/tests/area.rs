@@ -144,7 +144,7 @@ fn dimmed(stage: &Stage, spacing: f32, has_leans: bool) -> Option<(VisibilityAtl
     }
     let held = LightVisibility::new(&layout, lights, planes).unwrap();
     let held = if has_leans { leaning(held) } else { held };
-    atlas.resolve_lights(&held);
+    atlas.resolve_lights(&held).unwrap();
     let mut bench = Bench::new(&stage.scene, 1, &[])?;
     for instance in atlas.take_ready() {
         bench.scene.set_charts(&bench.gpu, instance, atlas.charts(instance).unwrap()).unwrap();

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::light_texels::{LIGHTS_A_TEXEL, LightTexel, LightTexels};
 use super::mix::Mix;
 use super::resolve::PointTexels;
-use super::{DirtyBand, ReadySet, SetState, VisibilityAtlas};
+use super::{BuildError, DirtyBand, ReadySet, SetState, VisibilityAtlas};
 use crate::gbuffer::Sample;
 
 /// Sum of a texel from which all of a light is seen; fits 16 bits.
@@ -126,10 +126,22 @@ impl VisibilityAtlas {
     /// Takes in how much of each light all points see, of instances that are ready and have none yet; to be called again when others are.
     /// 2 bytes a texel and light, 6 with leans.
     ///
+    /// # Errors
+    /// All instances that are ready would take more than [`AtlasParams::max_light_bytes`](super::AtlasParams::max_light_bytes): nothing is taken in.
+    ///
     /// # Panics
     /// If there are not as many points as in the layout.
-    pub fn resolve_lights(&mut self, lights: &LightVisibility) {
+    pub fn resolve_lights(&mut self, lights: &LightVisibility) -> Result<(), BuildError> {
         assert_eq!(lights.points(), self.layout.len(), "one value a point and light");
+        let texels = |state: &SetState| match state {
+            SetState::Ready(ready) => ready.sums.len() as u64,
+            _ => 0,
+        };
+        let a_light = self.sets.iter().map(texels).sum::<u64>() * if lights.has_leans() { 6 } else { 2 };
+        let (needed, limit) = (a_light.saturating_mul(lights.lights().into()), self.params.max_light_bytes);
+        if needed > limit {
+            return Err(BuildError::TooManyLights { lights: lights.lights(), needed, limit });
+        }
         let sets = self.layout.sets();
         let taken_in = self.sets.par_iter_mut().zip(sets).map(|(state, set)| match state {
             SetState::Ready(ready) if ready.lights.is_none() => {
@@ -150,6 +162,7 @@ impl VisibilityAtlas {
                 show(texels, state);
             }
         }
+        Ok(())
     }
 
     /// Drops what [`VisibilityAtlas::resolve_lights`] took in of all instances, so that it takes in other values: of another set of lights, or

@@ -46,11 +46,19 @@ pub struct AtlasParams {
     /// outside: this bounds the memory that it can ask for, some 10 bytes a texel and 60 more while an instance is made.
     /// Default `None`: 16 a point, and 2²⁰ more; 4 a point are common.
     pub max_texels: Option<u64>,
+    /// Most bytes of sums of how much is seen of lights, for all instances together ([`VisibilityAtlas::resolve_lights`]), default 256 MiB: how many lights
+    /// there are comes from outside, too.
+    pub max_light_bytes: u64,
 }
 
 impl Default for AtlasParams {
     fn default() -> Self {
-        AtlasParams { weights: WeightParams::default(), texel_factor: 1.0, max_texels: None }
+        AtlasParams {
+            weights: WeightParams::default(),
+            texel_factor: 1.0,
+            max_texels: None,
+            max_light_bytes: 256 << 20,
+        }
     }
 }
 
@@ -114,6 +122,16 @@ pub struct VisibilityAtlas {
 /// Why an instance cannot be shown with its visibility.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BuildError {
+    /// Lights of more texels than fit.
+    #[error("what is seen of {lights} lights takes {} MB, more than {} MB", needed / 1_000_000, limit / 1_000_000)]
+    TooManyLights {
+        /// Lights.
+        lights: u32,
+        /// Bytes that it would take.
+        needed: u64,
+        /// [`AtlasParams::max_light_bytes`].
+        limit: u64,
+    },
     /// Its mesh cannot be cut into charts.
     #[error(transparent)]
     Charts(#[from] ChartError),

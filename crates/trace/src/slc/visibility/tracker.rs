@@ -120,8 +120,7 @@ impl LightTracker {
         self.sites.capacity() * size_of::<Option<Site>>()
             + self.is_due.capacity()
             + self.glossy.capacity()
-            + self.values.values().len()
-            + size_of_val(self.values.leans())
+            + self.values.bytes()
     }
 
     /// All values as all rays would find them now, at the pose of the last step: [`LightTracker::values`] where nothing is due.

@@ -112,18 +112,18 @@ proptest! {
             }
             atlas.change_sets(&scene, next.clone(), None, &gone);
             layout = next;
-            atlas.resolve_lights(&held);
+            atlas.resolve_lights(&held).unwrap();
             change(&mut atlas, &mut held, count, seed ^ round);
             atlas.work(&scene, &vec![9; layout.len()], texels);
-            atlas.resolve_lights(&held);
+            atlas.resolve_lights(&held).unwrap();
             change(&mut atlas, &mut held, count, !seed ^ round);
         }
         while !atlas.work(&scene, &vec![9; layout.len()], usize::MAX).is_complete() {}
-        atlas.resolve_lights(&held);
+        atlas.resolve_lights(&held).unwrap();
         let mut fresh = complete(&scene, &layout, &vec![9; layout.len()]);
         atlas.show_lights(&shown);
         fresh.show_lights(&shown);
-        fresh.resolve_lights(&held);
+        fresh.resolve_lights(&held).unwrap();
         let count = |atlas: &VisibilityAtlas| {
             let all = (0..4).flat_map(|i| texels_of(atlas, i));
             all.filter(is_written).count()
@@ -151,7 +151,12 @@ fn what_is_open_or_blocked_everywhere_is_so_in_the_picture() {
     let memory = atlas.memory_bytes();
     let points = layout.len();
     let planes = [OPEN, 0, 13].iter().flat_map(|value| vec![*value; points]).collect();
-    atlas.resolve_lights(&LightVisibility::new(&layout, LIGHTS, planes).unwrap());
+    let lights = LightVisibility::new(&layout, LIGHTS, planes).unwrap();
+    let usual = std::mem::replace(&mut atlas.params.max_light_bytes, 1000);
+    assert!(matches!(atlas.resolve_lights(&lights), Err(BuildError::TooManyLights { limit: 1000, .. })));
+    assert_eq!(atlas.memory_bytes(), memory, "nothing is taken in");
+    atlas.params.max_light_bytes = usual;
+    atlas.resolve_lights(&lights).unwrap();
     let more = atlas.memory_bytes() - memory;
     assert!(more > 0 && more <= 2 * u64::from(LIGHTS) * atlas.texel_count() as u64, "{more} bytes");
     let pose = scene.pose(0.0);
