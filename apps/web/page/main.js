@@ -231,7 +231,7 @@ function listen() {
       KeyP: save,
       KeyH: () => byId("help-dialog").showModal(),
       KeyV: () => step(what),
-      KeyL: () => areaLights.click(),
+      KeyL: () => byId("area-lights").hidden || areaLights.click(),
       Digit1: () => step(method),
       Digit2: () => step(other),
     }[event.code];

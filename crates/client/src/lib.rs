@@ -31,6 +31,7 @@ use dapple_scene::area_lights::AreaLights;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Edits, Pose, PosedCamera, Scene};
 use dapple_store::charts::Cuts;
+use dapple_store::light_visibility::SeenLight;
 use dapple_store::points::PointStore;
 use dapple_stream::{Applied, Limits, ReceiveError, Subscriber};
 
@@ -248,7 +249,9 @@ fn complete(atlas: &mut VisibilityAtlas, scene: &Scene, store: &PointStore) {
         && lights.lights() as usize == AreaLights::new(scene, &scene.pose_undeformed(0.0)).len()
     {
         // Of more than fit nothing is known, as before the first snapshot.
-        let _ = atlas.resolve_lights(lights);
+        if atlas.resolve_lights(lights).is_err() {
+            atlas.forget_lights();
+        }
     }
 }
 

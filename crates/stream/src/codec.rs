@@ -33,7 +33,7 @@ pub(crate) use planes::{PLANES, planes};
 #[cfg(feature = "publish")]
 pub(crate) use sets::sets_head;
 pub(crate) use sets::{DecodedSets, decode_sets_change};
-pub(crate) use values::{BLOCK, Back, Near, SHARES, Scratch};
+pub(crate) use values::{BLOCK, Back, Candidates, Near, SHARES, Scratch};
 #[cfg(feature = "publish")]
 pub(crate) use values::{Fit, Goal, LEAF, Tolerances};
 pub use values::{ValueChange, first_chances};

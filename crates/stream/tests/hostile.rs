@@ -442,7 +442,13 @@ fn what_breaks_the_rules_of_bent_normals_is_named() {
     // Bits that mean nothing.
     let mut snapshot = payload(&BENT[0]);
     let flags = 32 + 2 + 8;
-    assert!(snapshot[flags] >= 0xc0 && snapshot[flags] & 0x3f <= 8, "{:x?}", &snapshot[32..50]);
-    snapshot[flags] |= 0x20;
+    assert!(snapshot[flags] >= 0xe0 && snapshot[flags] & 0x1f <= 8, "{:x?}", &snapshot[32..50]);
+    snapshot[flags] |= 0x10;
     malformed(&mut Subscriber::new(None, Limits::default()), FrameKind::Snapshot, 0, &snapshot, "local bits");
+    // Leans without lights, and sets without leans beside sets with some.
+    snapshot[flags] &= !0x50;
+    malformed(&mut Subscriber::new(None, Limits::default()), FrameKind::Snapshot, 0, &snapshot, "local bits");
+    let mut without = payload(&BENT[2]);
+    without[12] &= !0x20;
+    malformed(&mut bent(2), FrameKind::Sets, 2, &without, "where what is seen");
 }

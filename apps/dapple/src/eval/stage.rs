@@ -11,6 +11,7 @@ use dapple_render::shade::{Gathering, Openings, ShadeParams, shade_gathered, sha
 use dapple_scene::area_lights::AreaLights;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{CameraPath, Pose, PosedCamera, Scene};
+use dapple_store::light_visibility::SeenLight;
 use dapple_trace::Tracer;
 use dapple_trace::direct::{DirectParams, trace_direct};
 

@@ -122,6 +122,10 @@ impl Light {
             self.lights_problem = taken_in.err().map(lights_problem);
         } else if matches!(applied, Applied::Changes(_) | Applied::Sets { .. }) {
             atlas.apply_lights(self.received.light_changes());
+            // There may be room now for what did not fit.
+            if let (Applied::Sets { .. }, Some(lights)) = (applied, lights) {
+                self.lights_problem = atlas.resolve_lights(lights).err().map(lights_problem);
+            }
         }
     }
 

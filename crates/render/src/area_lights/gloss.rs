@@ -13,7 +13,7 @@ use crate::slc::cap::{EIGHT, FOUR, ONE, Pattern, SIXTEEN};
 /// Mean cosine below which a cone is not taken at its word.
 const LEAST_COSINE: f32 = 0.01;
 
-/// Lean, in angular radii, below which there is none: about a step of a texel.
+/// Lean, in angular radii, below which there is none: two steps of a texel.
 const LEAST_LEAN: f32 = 1.0 / 64.0;
 
 /// Alpha from which on it is not seen which part of a light is hidden.
@@ -75,10 +75,11 @@ impl<'a> Surface<'a> {
     pub(super) fn seen(&self, arrival: &Arrival, seen: &SeenLight) -> Arrival {
         let [x, y] = seen.lean;
         let far = (x * x + y * y).sqrt().min(1.0);
-        if far < LEAST_LEAN || self.point.reflectance.alpha >= ROUGH_ALPHA {
+        let depth = 1.0 - arrival.cos_angle;
+        // Beyond a hemisphere there is no side.
+        if far < LEAST_LEAN || depth >= 1.0 || self.point.reflectance.alpha >= ROUGH_ALPHA {
             return *arrival;
         }
-        let depth = (1.0 - arrival.cos_angle).clamp(0.0, 1.0);
         let sine = (depth * (2.0 - depth)).max(0.0).sqrt();
         let [across, along] = lean_frame(arrival.direction);
         let leaning = arrival.direction + (across * x + along * y) * sine;

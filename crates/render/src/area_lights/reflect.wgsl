@@ -79,11 +79,12 @@ fn area_texel(atlas: vec3<f32>, texel: vec2<u32>, first: i32, otherwise: vec4<f3
 // The cone, axis and cosine, of what is seen of a light: it leans to where that lies.
 fn area_seen(s: AreaSurface, cone: vec4<f32>, fraction: f32, lean: vec2<f32>) -> vec4<f32> {
     let far = min(length(lean), 1.0);
-    if far < AREA_LEAST_LEAN {
+    let depth = 1.0 - cone.w;
+    // Beyond a hemisphere there is no side.
+    if far < AREA_LEAST_LEAN || depth >= 1.0 {
         return cone;
     }
     let axis = cone.xyz;
-    let depth = clamp(1.0 - cone.w, 0.0, 1.0);
     let sine = sqrt(max(depth * (2.0 - depth), 0.0));
     // As `lean_frame`.
     let k = 1.0 / max(1.0 + axis.y, 1e-4);

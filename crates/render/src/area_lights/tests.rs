@@ -243,7 +243,7 @@ fn highlights_of_lights_half_hidden_are_of_the_half_that_is_seen() {
                     continue;
                 }
                 let size = summed(&stage, position, |_| Vec3::ONE).x / RADIANCE.x;
-                let depth = size / (2.0 * PI);
+                let depth = 2.0 * (1.0 - (summed(&stage, position, |l| l) / RADIANCE).length() / size);
                 let axis = all.normalize();
                 let shift = (seen.normalize() - axis) / (depth * (2.0 - depth)).sqrt();
                 let lean = Lean::quantized(lean_frame(axis).map(|across| across.dot(shift))).radii();

@@ -24,8 +24,8 @@ pub struct LightVisibility {
     lights: u32,
     /// Light by light.
     values: Vec<u8>,
-    /// As many, or none at all. [`Lean::NONE`] where all or nothing is seen.
-    leans: Vec<Lean>,
+    /// As many. [`Lean::NONE`] where all or nothing is seen.
+    leans: Option<Vec<Lean>>,
 }
 
 /// A value that is another now, or leans elsewhere.
@@ -104,7 +104,7 @@ impl LightVisibility {
     pub fn open(layout: &PointLayout, lights: u32) -> Result<LightVisibility, LightVisibilityError> {
         let points = layout.len();
         let values = check_size(points, lights)?;
-        Ok(LightVisibility { points, lights, values: vec![OPEN; values], leans: Vec::new() })
+        Ok(LightVisibility { points, lights, values: vec![OPEN; values], leans: None })
     }
 
     /// Whether so many can be held.
@@ -131,7 +131,7 @@ impl LightVisibility {
         if let Some(index) = values.iter().position(|&value| value > OPEN) {
             return Err(LightVisibilityError::BadValue { index, value: values[index] });
         }
-        Ok(LightVisibility { points, lights, values, leans: Vec::new() })
+        Ok(LightVisibility { points, lights, values, leans: None })
     }
 
     /// The same with where what is seen of each light lies, light by light.
@@ -149,13 +149,18 @@ impl LightVisibility {
                 index,
             });
         }
-        Ok(LightVisibility { leans, ..self })
+        Ok(LightVisibility { leans: Some(leans), ..self })
     }
 
-    /// Values and leans (as many, or none at all) that were put together from others, so that each is in range.
-    pub(crate) fn carried(points: usize, lights: u32, values: Vec<u8>, leans: Vec<Lean>) -> LightVisibility {
+    /// Values and leans (as many, if any) that were put together from others, so that each is in range.
+    pub(crate) fn carried(
+        points: usize,
+        lights: u32,
+        values: Vec<u8>,
+        leans: Option<Vec<Lean>>,
+    ) -> LightVisibility {
         debug_assert_eq!(values.len(), points * lights as usize);
-        debug_assert!(leans.is_empty() || leans.len() == values.len());
+        debug_assert!(leans.as_ref().is_none_or(|leans| leans.len() == values.len()));
         LightVisibility { points, lights, values, leans }
     }
 
@@ -182,23 +187,23 @@ impl LightVisibility {
 
     /// Whether it is held where what is seen of lights lies.
     pub fn has_leans(&self) -> bool {
-        !self.leans.is_empty()
+        self.leans.is_some()
     }
 
     /// Where what is seen of lights lies, light by light; empty where that is not held.
     pub fn leans(&self) -> &[Lean] {
-        &self.leans
+        self.leans.as_deref().unwrap_or(&[])
     }
 
     /// The same of one light at all points; empty where that is not held.
     pub fn leans_of_light(&self, light: u32) -> &[Lean] {
         let start = light as usize * self.points;
-        self.leans.get(start..start + self.points).unwrap_or(&[])
+        self.leans().get(start..start + self.points).unwrap_or(&[])
     }
 
     /// Where what is seen lies, of the value of an index; [`Lean::NONE`] where that is not held.
     pub fn lean(&self, index: usize) -> Lean {
-        self.leans.get(index).copied().unwrap_or_default()
+        self.leans().get(index).copied().unwrap_or_default()
     }
 
     /// The value of a light at a point, 0 … [`OPEN`]; `None` if there is none.
@@ -217,11 +222,12 @@ impl LightVisibility {
         let new = value.min(OPEN);
         let of_value = self.values.get_mut(index).is_some_and(|held| std::mem::replace(held, new) != new);
         let lean = lean.of_value(new);
-        let of_lean = self.leans.get_mut(index).is_some_and(|held| std::mem::replace(held, lean) != lean);
+        let held = self.leans.as_mut().and_then(|leans| leans.get_mut(index));
+        let of_lean = held.is_some_and(|held| std::mem::replace(held, lean) != lean);
         of_value || of_lean
     }
 
-    /// Sets changed values; all or, if one does not fit, none.
+    /// Sets changed values; all or, if one does not fit, none. A lean beyond [`LEAN_STEPS`] counts as one of the rim.
     ///
     /// # Errors
     /// An index that is not there, a value above [`OPEN`].
@@ -246,13 +252,13 @@ impl LightVisibility {
 
     /// Bytes that values and leans take.
     pub fn bytes(&self) -> usize {
-        self.values.len() + size_of_val(&self.leans[..])
+        self.values.len() + size_of_val(self.leans())
     }
 
     /// A hash of all that is held, the same on every machine: to compare ends (FNV-1a, 64 bits).
     pub fn hash(&self) -> u64 {
         let sizes = [self.points as u64, u64::from(self.lights)].map(u64::to_le_bytes);
-        let leans = self.leans.iter().flat_map(|lean| lean.0.map(|step| step as u8));
+        let leans = self.leans().iter().flat_map(|lean| lean.0.map(|step| step as u8));
         let bytes = sizes.iter().flatten().chain(&self.values).copied().chain(leans);
         bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
             (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)

@@ -130,8 +130,8 @@ impl PointStore {
             let values = (0..count).flat_map(of).collect();
             let has_leans = |store: &PointStore| store.lights().is_some_and(LightVisibility::has_leans);
             let of = |light| carry_plane((self, added), &layout, leans_of(light), Lean::NONE);
-            let leans = if has_leans(self) || has_leans(added) { 0..count } else { 0..0 };
-            Box::new(LightVisibility::carried(layout.len(), count, values, leans.flat_map(of).collect()))
+            let leans = (has_leans(self) || has_leans(added)).then(|| (0..count).flat_map(of).collect());
+            Box::new(LightVisibility::carried(layout.len(), count, values, leans))
         });
         PointStore { layout, visibility, bent, lights }
     }

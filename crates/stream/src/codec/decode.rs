@@ -215,7 +215,8 @@ pub(crate) fn decode_values(
     let visibility = plane(&mut reader)?;
     let bent = if extras.has_bent { Some([plane(&mut reader)?, plane(&mut reader)?]) } else { None };
     let mut lights = Vec::with_capacity(layout.len() * extras.lights as usize);
-    let (mut leans, mut coder) = (Vec::new(), LeanCoder::new());
+    let mut leans = Vec::with_capacity(if extras.has_leans { lights.capacity() } else { 0 });
+    let mut coder = LeanCoder::new();
     for _ in 0..extras.lights {
         let values = plane(&mut reader)?;
         if values.iter().any(|value| *value > OPEN) {

@@ -97,7 +97,7 @@ pub(crate) fn snapshot_payload(
 /// The values of a snapshot, appended to `out`.
 pub(super) fn append_values(out: Vec<u8>, near: &Near, store: &PointStore) -> Vec<u8> {
     let mut writer = Writer::new(out);
-    let mut code = |writer: &mut Writer, plane: &[u8]| {
+    let code = |writer: &mut Writer, plane: &[u8]| {
         code_values(writer, store.layout(), near, |point| plane[point]).expect("only reading fails");
     };
     planes(store).for_each(|plane| code(&mut writer, plane));

@@ -4,7 +4,7 @@ use dapple_store::light_visibility::{LEAN_STEPS, Lean, OPEN};
 use dapple_store::points::PointLayout;
 
 use crate::codec::entropy::{Chance, Coder, Number};
-use crate::codec::{BLOCK, Near, SHARES, unzigzag, zigzag};
+use crate::codec::{BLOCK, Candidates, Near, SHARES, unzigzag, zigzag};
 
 /// What is learned of leans while a frame is coded.
 pub(super) struct Leans {
@@ -56,11 +56,12 @@ impl Leans {
 pub(crate) struct LeanCoder {
     leans: Leans,
     some: Chance,
+    candidates: Candidates,
 }
 
 impl LeanCoder {
     pub(crate) fn new() -> LeanCoder {
-        LeanCoder { leans: Leans::new(), some: Chance::EVEN }
+        LeanCoder { leans: Leans::new(), some: Chance::EVEN, candidates: Candidates::default() }
     }
 
     /// Codes those of one light, whose values are known; a reader has none `wanted`. Nothing if its bytes end too early.
@@ -81,7 +82,7 @@ impl LeanCoder {
             if !of_block.iter().any(|value| has(*value)) {
                 continue;
             }
-            let back = near.neighbours(layout, block);
+            let back = near.neighbours(layout, block, &mut self.candidates);
             for point in (block * BLOCK..).take(of_block.len()).filter(|point| has(values[*point])) {
                 let before = SHARES.iter().zip(back[point % BLOCK]).filter(|(_, back)| *back > 0);
                 let before = before.map(|(share, back)| (*share, point - usize::from(back)));

@@ -11,29 +11,30 @@ use crate::light_visibility::code_light_changes;
 const COARSEST: u32 = 16;
 
 /// What subscribers are to hold of `store`: what is off by more than `times` its tolerance (index and steps, ascending; 0 of those that are not
-/// listed, but where `times` is above 1, one step of all), or leans elsewhere while there is room, as it is there, the rest as it is `held`. `None` where
-/// all of it is near enough.
+/// listed, but where `times` is above 1, one step of all), and with `turns` what leans farther off than a step, as it is there, the rest as it is `held`.
+/// `None` where all of it is near enough.
 pub(super) fn light_changes(
     held: &PointStore,
     store: &PointStore,
     tolerances: &[(u32, u8)],
-    times: u32,
+    (times, turns): (u32, bool),
 ) -> Option<LightVisibility> {
     let (held, new) = (held.lights()?, store.lights()?);
+    let turns = turns && new.has_leans();
     let mut wanted: Option<LightVisibility> = None;
     let mut tolerances = tolerances.iter().peekable();
     for (index, (old, value)) in held.values().iter().zip(new.values()).enumerate() {
-        let (old_lean, lean) = (held.lean(index), new.lean(index));
-        if old == value && old_lean == lean {
+        if old == value && !(turns && held.lean(index) != new.lean(index)) {
             continue;
         }
+        let (old_lean, lean) = (held.lean(index), new.lean(index));
         while tolerances.next_if(|(listed, _)| (*listed as usize) < index).is_some() {}
         let tolerance = tolerances.peek().filter(|(listed, _)| *listed as usize == index);
         let tolerance = tolerance.map_or(0, |(_, steps)| u32::from(*steps));
         let steps = tolerance.max(u32::from(times > 1));
         // What is not half seen there, or hardly shines, need not lean.
         let leans = |value: u8| value > 0 && value < OPEN;
-        let is_turned = times == 1
+        let is_turned = turns
             && leans(*old)
             && leans(*value)
             && tolerance < u32::from(OPEN)
@@ -61,13 +62,19 @@ pub(super) fn lights_within(
         debug_assert!(coded.is_some(), "only reading fails");
         coder.finish().len()
     };
-    let mut wanted = light_changes(held, store, tolerances, 1)?;
+    let mut wanted = light_changes(held, store, tolerances, (1, true))?;
     let mut bytes = bytes_of(&wanted);
+    // How much is seen is worth more than where.
+    if bytes > most_bytes
+        && let Some(fewer) = light_changes(held, store, tolerances, (1, false))
+    {
+        (bytes, wanted) = (bytes_of(&fewer), fewer);
+    }
     let mut times = 1;
     while bytes > most_bytes && times < COARSEST {
         times *= 2;
         // Where nothing is that far off, there still is something to say.
-        let Some(fewer) = light_changes(held, store, tolerances, times) else { break };
+        let Some(fewer) = light_changes(held, store, tolerances, (times, false)) else { break };
         bytes = bytes_of(&fewer);
         wanted = fewer;
     }

@@ -275,7 +275,7 @@ impl State {
         let precision = precisions[0];
         let Some(most_bytes) = spending.most_bytes else {
             self.pressure = Pressure::default();
-            let lights = light_changes(&self.store, store, spending.light_tolerances, 1);
+            let lights = light_changes(&self.store, store, spending.light_tolerances, (1, true));
             return self.encode(epoch, store, exact, lights.as_ref());
         };
         let most = most_bytes.saturating_sub(ENVELOPE_BYTES);
@@ -384,7 +384,8 @@ impl State {
             let exact = precisions.map(|Precision { tolerance, step }| (Tolerances::Even(tolerance), step));
             goals_of(&self.store, store, exact)
         });
-        let lights = exact.and_then(|(_, tolerances)| light_changes(&self.store, store, tolerances, 1));
+        let lights =
+            exact.and_then(|(_, tolerances)| light_changes(&self.store, store, tolerances, (1, true)));
         if goals.is_some() || lights.is_some() {
             let goals = goals.unwrap_or_default();
             let State { near, store: held, fits, scratch, .. } = self;

@@ -5,7 +5,7 @@ use dapple_store::light_visibility::{LEAN_STEPS, Lean, LightChange, LightVisibil
 use dapple_store::points::PointSet;
 use rayon::prelude::*;
 
-use super::light_texels::{LIGHTS_A_TEXEL, LightTexel, LightTexels};
+use super::light_texels::{LIGHTS_A_TEXEL, LightTexel, LightTexels, PLANES_WITH_LEANS};
 use super::mix::Mix;
 use super::resolve::PointTexels;
 use super::{BuildError, DirtyBand, ReadySet, SetState, VisibilityAtlas};
@@ -14,16 +14,23 @@ use crate::gbuffer::Sample;
 /// Sum of a texel from which all of a light is seen; fits 16 bits.
 const OPEN_SUM: u16 = OPEN as u16 * WEIGHT_SUM;
 
+/// Bytes that a texel takes for each light, and more for where it lies what is seen.
+const BYTES_A_SUM: u64 = 2;
+const BYTES_A_LEAN: u64 = 4;
+
+/// Layers of planes of lights that every card has room for beside its own spare one.
+const MAX_LIGHT_LAYERS: usize = 255;
+
 /// Exact sums of weight × value, light by light, one a texel of a set; open where no point counts.
 #[derive(Clone, Debug)]
 pub(super) struct LightSums {
     texels: usize,
     sums: Vec<u16>,
-    /// Of weight × steps of leans; as many, or none.
+    /// Of weight × value × steps of leans, which fits 16 bits too; as many, or none.
     leans: Vec<[i16; 2]>,
 }
 
-/// By how much a point's value changes, and its lean.
+/// By how much a point's value changes, and its value × lean.
 #[derive(Clone, Copy)]
 struct Difference {
     value: i32,
@@ -32,18 +39,23 @@ struct Difference {
 
 impl Difference {
     fn of(value: u8, lean: Lean) -> Difference {
-        Difference { value: value.into(), lean: lean.0.map(i32::from) }
+        Difference { value: value.into(), lean: lean.0.map(|step| i32::from(step) * i32::from(value)) }
     }
 }
 
 impl LightSums {
-    fn new(texels: usize, table: &PointTexels, set: &PointSet, lights: &LightVisibility) -> LightSums {
+    fn new(
+        texels: usize,
+        table: &PointTexels,
+        (set, lights): (&PointSet, &LightVisibility),
+        with_leans: bool,
+    ) -> LightSums {
         let mut open = vec![OPEN_SUM; texels];
         for point in 0..set.len() {
             table.for_each_run(point, |texel, weights| open[texel as usize..][..weights.len()].fill(0));
         }
         let count = texels * lights.lights() as usize;
-        let leans = vec![[0; 2]; if lights.has_leans() { count } else { 0 }];
+        let leans = vec![[0; 2]; if with_leans { count } else { 0 }];
         let mut sums = LightSums { texels, sums: Vec::with_capacity(count), leans };
         for light in 0..lights.lights() {
             sums.sums.extend_from_slice(&open);
@@ -76,10 +88,10 @@ impl LightSums {
                 *sum = sum.wrapping_add((weight * difference.value) as u16);
                 let mut shows = LightTexel { share: value_of(*sum), ..LightTexel::OPEN };
                 if let Some(lean) = leans.as_mut().and_then(|leans| leans.get_mut(texel as usize)) {
-                    for (sum, by) in lean.iter_mut().zip(difference.lean) {
-                        *sum = sum.wrapping_add((weight * by) as i16);
+                    for (lean, by) in lean.iter_mut().zip(difference.lean) {
+                        *lean = lean.wrapping_add((weight * by) as i16);
                     }
-                    shows.lean = lean.map(lean_of);
+                    shows.lean = lean.map(|lean| lean_of(lean, *sum));
                 }
                 shown(texel, shows);
             }
@@ -89,9 +101,10 @@ impl LightSums {
     /// What a texel sees of a light; `None` if there is no such light.
     fn at(&self, light: u32, texel: u32) -> Option<LightTexel> {
         let index = light as usize * self.texels + texel as usize;
-        let share = value_of(*self.sums.get(index)?);
-        let lean = self.leans.get(index).map_or(LightTexel::OPEN.lean, |lean| lean.map(lean_of));
-        Some(LightTexel { share, lean })
+        let sum = *self.sums.get(index)?;
+        let lean = |lean: &[i16; 2]| lean.map(|lean| lean_of(lean, sum));
+        let lean = self.leans.get(index).map_or(LightTexel::OPEN.lean, lean);
+        Some(LightTexel { share: value_of(sum), lean })
     }
 
     pub(super) fn bytes(&self) -> usize {
@@ -105,10 +118,12 @@ fn value_of(sum: u16) -> u8 {
     ((u32::from(sum) * 255 + open / 2) / open) as u8
 }
 
-/// A sum of steps as a texel shows it: 128 the middle, 1 and 255 the rim.
-fn lean_of(sum: i16) -> u8 {
-    let rim = i32::from(LEAN_STEPS) * i32::from(WEIGHT_SUM);
-    (128 + (2 * 127 * i32::from(sum) + rim).div_euclid(2 * rim)) as u8
+/// A sum of values × steps as a texel shows it whose values have that sum: the middle of what is seen from its points. 128 the middle of the light, 1 and 255 its
+/// rim.
+fn lean_of(sum: i16, values: u16) -> u8 {
+    // No more than the rim while sums are on the way.
+    let rim = i32::from(LEAN_STEPS) * i32::from(values).max(1);
+    (128 + (2 * 127 * i32::from(sum) + rim).div_euclid(2 * rim).clamp(-127, 127)) as u8
 }
 
 /// What is seen of a light where these texels are mixed; `None` if there is no such light.
@@ -137,24 +152,29 @@ impl VisibilityAtlas {
             SetState::Ready(ready) => ready.sums.len() as u64,
             _ => 0,
         };
-        let a_light = self.sets.iter().map(texels).sum::<u64>() * if lights.has_leans() { 6 } else { 2 };
-        let (needed, limit) = (a_light.saturating_mul(lights.lights().into()), self.params.max_light_bytes);
-        if needed > limit {
+        let (texels, limit) = (self.sets.iter().map(texels).sum::<u64>(), self.params.max_light_bytes);
+        let needed = |a_texel: u64| (texels * a_texel).saturating_mul(lights.lights().into());
+        if needed(BYTES_A_SUM) > limit {
+            let needed = needed(BYTES_A_SUM);
             return Err(BuildError::TooManyLights { lights: lights.lights(), needed, limit });
         }
+        // Where there is no room for all, how much is seen is worth more than where.
+        let with_leans = lights.has_leans() && needed(BYTES_A_SUM + BYTES_A_LEAN) <= limit;
         let sets = self.layout.sets();
         let taken_in = self.sets.par_iter_mut().zip(sets).map(|(state, set)| match state {
             SetState::Ready(ready) if ready.lights.is_none() => {
-                ready.lights = Some(LightSums::new(ready.sums.len(), &ready.table, set, lights));
+                let sums = LightSums::new(ready.sums.len(), &ready.table, (set, lights), with_leans);
+                ready.lights = Some(sums);
                 true
             }
             _ => false,
         });
         let taken_in: Vec<bool> = taken_in.collect();
-        if self.has_leans != lights.has_leans() {
-            self.has_leans = lights.has_leans();
-            let shown = self.light_texels.take().map(|texels| texels.lights().to_vec());
-            self.show_lights(&shown.unwrap_or_default());
+        self.has_leans = with_leans;
+        let shown = self.shown_lights().to_vec();
+        if self.light_texels.as_ref().is_some_and(|texels| texels.has_leans() != self.show_leans(&shown)) {
+            self.light_texels = None;
+            self.show_lights(&shown);
         }
         if let Some(texels) = &mut self.light_texels {
             texels.grow(self.pages.texel_count());
@@ -186,11 +206,22 @@ impl VisibilityAtlas {
             return;
         }
         self.light_texels = (!lights.is_empty()).then(|| {
-            let mut texels =
-                LightTexels::new(self.pages.side(), self.pages.texel_count(), lights, self.has_leans);
+            let mut texels = LightTexels::new(
+                self.pages.side(),
+                self.pages.texel_count(),
+                lights,
+                self.show_leans(lights),
+            );
             self.sets.iter().for_each(|state| show(&mut texels, state));
             texels
         });
+    }
+
+    /// Whether there are leans to be shown of so many lights, and a card has layers for them.
+    fn show_leans(&self, lights: &[u32]) -> bool {
+        let layers = self.pages.texel_count() / (self.pages.side() as usize).pow(2).max(1);
+        let planes = lights.len().div_ceil(LIGHTS_A_TEXEL) * PLANES_WITH_LEANS;
+        self.has_leans && planes * layers <= MAX_LIGHT_LAYERS
     }
 
     /// The lights that texels are kept of.

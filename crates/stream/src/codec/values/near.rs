@@ -59,8 +59,8 @@ impl Near {
     }
 
     /// The neighbours of a block's points, found anew.
-    pub(crate) fn neighbours(&self, layout: &PointLayout, block: usize) -> Back {
-        self.blocks.find(layout, block, &mut Candidates::default())
+    pub(crate) fn neighbours(&self, layout: &PointLayout, block: usize, candidates: &mut Candidates) -> Back {
+        self.blocks.find(layout, block, candidates)
     }
 
     /// The neighbours of a block's points, kept for the next time.

@@ -14,7 +14,6 @@ use dapple_store::light_visibility::{
 };
 use dapple_store::points::PointLayout;
 use rayon::prelude::*;
-use std::f32::consts::PI;
 
 pub use tracker::{LightTracker, TrackerParams};
 
@@ -73,13 +72,13 @@ impl std::ops::Add for VisibilityCounts {
 /// [`GeneratedPoints::sites_world`](crate::psao::generate::GeneratedPoints::sites_world) has them; missing ones count as points without any.
 ///
 /// A point that a light does not reach takes over the value of the point before it, which costs next to nothing to send. `glossy` says of which points it is
-/// to be found where on a light lies what they see of it; of none if it is empty: then no leans are held.
+/// to be found where on a light lies what they see of it; without it no leans are held.
 ///
 /// # Errors
 /// More points and lights than fit.
 pub fn trace_visibility(
     layout: &PointLayout,
-    (sites, glossy): (&[Option<Site>], &[bool]),
+    (sites, glossy): (&[Option<Site>], Option<&[bool]>),
     tracer: &Tracer,
     lights: &AreaLights<'_>,
     params: &VisibilityParams,
@@ -88,7 +87,7 @@ pub fn trace_visibility(
     // Refuses what is too much before anything is traced.
     let open = LightVisibility::open(layout, count)?;
     let mut values = open.values().to_vec();
-    let mut leans = if glossy.is_empty() { Vec::new() } else { vec![Lean::NONE; values.len()] };
+    let mut leans = glossy.map(|_| vec![Lean::NONE; values.len()]);
     let mut counts = VisibilityCounts::default();
     for (light, plane) in values.chunks_mut(layout.len().max(1)).enumerate() {
         let found = trace_light((sites, glossy), (light, lights), tracer, params);
@@ -98,21 +97,21 @@ pub fn trace_visibility(
         for (point, value) in plane.iter_mut().enumerate() {
             if let Some((_, new, lean)) = found.next_if(|(at, ..)| *at == point) {
                 last = *new;
-                if let Some(held) = leans.get_mut(first + point) {
-                    *held = *lean;
+                if let Some(leans) = &mut leans {
+                    leans[first + point] = *lean;
                 }
             }
             *value = last;
         }
     }
     let held = LightVisibility::new(layout, count, values)?;
-    Ok((if leans.is_empty() { held } else { held.with_leans(leans)? }, counts))
+    Ok((if let Some(leans) = leans { held.with_leans(leans)? } else { held }, counts))
 }
 
 /// Finds all values again, whatever changed; what a light does not reach stays. Gives the changes, which `values` has already.
 pub fn retrace_visibility(
     values: &mut LightVisibility,
-    (sites, glossy): (&[Option<Site>], &[bool]),
+    (sites, glossy): (&[Option<Site>], Option<&[bool]>),
     tracer: &Tracer,
     lights: &AreaLights<'_>,
     params: &VisibilityParams,
@@ -146,7 +145,7 @@ type Found = (Vec<(usize, u8, Lean)>, VisibilityCounts);
 
 /// Values of one light at those points that it reaches.
 fn trace_light(
-    (sites, glossy): (&[Option<Site>], &[bool]),
+    (sites, glossy): (&[Option<Site>], Option<&[bool]>),
     (light, lights): (usize, &AreaLights<'_>),
     tracer: &Tracer,
     params: &VisibilityParams,
@@ -160,7 +159,7 @@ fn trace_light(
             if lights.arriving(light, site.position_world, site.normal_world) <= 0.0 {
                 continue;
             }
-            let wants_lean = glossy.get(point) == Some(&true);
+            let wants_lean = glossy.is_some_and(|glossy| glossy.get(point) == Some(&true));
             let found = worker.value(tracer, (light, lights), (site, wants_lean), params, &mut counts.rays);
             if let Some((value, lean)) = found {
                 counts.traced += 1;
@@ -191,10 +190,9 @@ struct Directions {
     /// Of share × direction: of all, and of what is seen.
     all: Vec3,
     seen: Vec3,
-    /// Of solid angle: 1 / density.
+    /// Of solid angle, 1 / density, and of it × direction.
     sr: f32,
-    /// Places that were drawn, those too that cannot be seen.
-    drawn: u32,
+    vector: Vec3,
 }
 
 impl Worker {
@@ -227,11 +225,14 @@ impl Worker {
                 if share > 0.0 && share.is_finite() {
                     self.reaches.push(sample.reach());
                     self.shares.push(share);
-                    self.directions.sr += 1.0 / sample.density_per_sr;
+                    if wants_lean {
+                        let sr = 1.0 / sample.density_per_sr;
+                        self.directions.sr += sr;
+                        self.directions.vector += sample.to_light_world * sr;
+                    }
                     sent += 1;
                 }
             }
-            self.directions.drawn = next;
             let blocked = tracer.occlusion(origin, &self.reaches, 1.0);
             *rays += self.reaches.len() as u64;
             for (i, share) in self.shares.iter().enumerate() {
@@ -260,15 +261,16 @@ impl Worker {
 }
 
 impl Directions {
-    /// How far the middle of what is seen lies from that of all, in angular radii of a cap of the light's solid angle.
+    /// How far the middle of what is seen lies from that of all, in sines of the angle of a cap whose directions are as far apart as the light's.
     fn lean(&self) -> Lean {
         let (Some(all), Some(seen)) = (self.all.try_normalize(), self.seen.try_normalize()) else {
             return Lean::NONE;
         };
-        // 1 − cos of the cap's angle; of more than a hemisphere there is no side.
-        let depth = self.sr / self.drawn.max(1) as f32 / (2.0 * PI);
+        // The mean direction of a cap is (1 + cos a) / 2 long; from below, what two numbers of about one differ by is noise.
+        let depth = (2.0 * (1.0 - self.vector.length() / self.sr)).max(1e-6);
         let sine = (depth * (2.0 - depth)).sqrt();
-        if !(depth > 0.0 && depth < 1.0) {
+        // Of more than a hemisphere there is no side; nor of what is no number.
+        if depth >= 1.0 || !sine.is_finite() {
             return Lean::NONE;
         }
         let offset = (seen - all) / sine;

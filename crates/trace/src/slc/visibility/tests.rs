@@ -68,7 +68,7 @@ impl Rig {
 
     fn trace(&self, pose: &Pose, params: &VisibilityParams) -> (LightVisibility, VisibilityCounts) {
         let (tracer, lights) = (Tracer::new(&self.scene, pose), AreaLights::new(&self.scene, pose));
-        trace_visibility(&self.layout, (&self.sites, &[]), &tracer, &lights, params).unwrap()
+        trace_visibility(&self.layout, (&self.sites, None), &tracer, &lights, params).unwrap()
     }
 
     fn tracker(&self, tolerance: f32, visibility: VisibilityParams) -> LightTracker {

@@ -39,8 +39,8 @@ pub struct LightTracker {
     layout: Arc<PointLayout>,
     /// Of the points, at the moment of the last step.
     sites: Vec<Option<Site>>,
-    /// Which points lie on something glossy; none where nothing of the scene is.
-    glossy: Vec<bool>,
+    /// Which points lie on something glossy; `None` where nothing of the scene is.
+    glossy: Option<Vec<bool>>,
     values: LightVisibility,
     /// Which values are to be found again, one each.
     is_due: Vec<bool>,
@@ -72,7 +72,7 @@ impl LightTracker {
         let lights = AreaLights::new(scene, pose);
         let glossy = glossy(scene, layout, anchors);
         let (values, first) =
-            trace_visibility(layout, (&sites, &glossy), tracer, &lights, &params.visibility)?;
+            trace_visibility(layout, (&sites, glossy.as_deref()), tracer, &lights, &params.visibility)?;
         let is_due = vec![false; values.values().len()];
         let mut tracker = LightTracker {
             params,
@@ -119,7 +119,7 @@ impl LightTracker {
     pub fn bytes(&self) -> usize {
         self.sites.capacity() * size_of::<Option<Site>>()
             + self.is_due.capacity()
-            + self.glossy.capacity()
+            + self.glossy.as_ref().map_or(0, Vec::capacity)
             + self.values.bytes()
     }
 
@@ -133,8 +133,13 @@ impl LightTracker {
         let lights = AreaLights::new(scene, pose);
         let mut values = self.values.clone();
         let params = &self.params.visibility;
-        let (_, counts) =
-            super::retrace_visibility(&mut values, (&self.sites, &self.glossy), tracer, &lights, params);
+        let (_, counts) = super::retrace_visibility(
+            &mut values,
+            (&self.sites, self.glossy.as_deref()),
+            tracer,
+            &lights,
+            params,
+        );
         (values, counts)
     }
 
@@ -297,7 +302,7 @@ impl LightTracker {
                 let (light, mut rays) = (index / points, 0);
                 let site = self.sites[index % points].as_ref().filter(|site| is_usable(site));
                 let site = site.filter(|s| lights.arriving(light, s.position_world, s.normal_world) > 0.0);
-                let wants_lean = self.glossy.get(index % points) == Some(&true);
+                let wants_lean = self.glossy.as_ref().is_some_and(|glossy| glossy[index % points]);
                 let params = &self.params.visibility;
                 let value = site.and_then(|site| {
                     worker.value(tracer, (light, lights), (site, wants_lean), params, &mut rays)
@@ -309,14 +314,16 @@ impl LightTracker {
         list.par_chunks(CHUNK).flat_map_iter(chunk).collect()
     }
 
-    /// By how many steps values may be off, of those that differ from what is `held` elsewhere of the same points: index and steps, ascending.
+    /// By how many steps values may be off, of those that differ from what is `held` elsewhere of the same points, or lean elsewhere: index and steps, ascending.
     /// `pose` is that of the last step.
     pub fn tolerances(&self, held: &LightVisibility, scene: &Scene, pose: &Pose) -> Vec<(u32, u8)> {
         let lights = AreaLights::new(scene, pose);
-        let pairs = held.values().par_iter().zip(self.values.values()).enumerate();
-        let differ = pairs.filter(|(_, (held, new))| held != new);
-        let steps = |(index, _): (usize, _)| (index as u32, self.tolerance(index, &lights));
-        differ.map(steps).collect()
+        let values = &self.values;
+        let all = (0..held.values().len().min(values.values().len())).into_par_iter();
+        let differ = all.filter(|&index| {
+            held.values()[index] != values.values()[index] || held.lean(index).is_far_from(values.lean(index))
+        });
+        differ.map(|index| (index as u32, self.tolerance(index, &lights))).collect()
     }
 
     /// By how many steps a value may be off; 255 where its light does not matter.
@@ -344,12 +351,13 @@ impl LightTracker {
 /// Roughness up to which a surface mirrors enough of a light for one to see which part of it is hidden.
 const GLOSSY_ROUGHNESS: f32 = 0.5;
 
-/// Which points lie on something glossy; none if nothing of the scene may be, whichever points there are.
-fn glossy(scene: &Scene, layout: &PointLayout, anchors: &[Anchor]) -> Vec<bool> {
+/// Which points lie on something glossy; `None` if nothing of the scene may be, whichever points there are.
+fn glossy(scene: &Scene, layout: &PointLayout, anchors: &[Anchor]) -> Option<Vec<bool>> {
     let may_be =
         |m: &Material| m.roughness_factor <= GLOSSY_ROUGHNESS || m.metallic_roughness_texture.is_some();
-    if !scene.materials.iter().any(may_be) {
-        return Vec::new();
+    let mut parts = scene.instances.iter().flat_map(|instance| &scene.meshes[instance.mesh as usize].parts);
+    if !parts.any(|part| may_be(&scene.materials[part.material as usize])) {
+        return None;
     }
     let mut found = Vec::with_capacity(layout.len());
     for set in layout.sets() {
@@ -367,5 +375,5 @@ fn glossy(scene: &Scene, layout: &PointLayout, anchors: &[Anchor]) -> Vec<bool> 
         };
         found.extend(anchors[set.first as usize..][..set.len()].iter().map(is_glossy));
     }
-    found
+    Some(found)
 }
