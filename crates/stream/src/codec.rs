@@ -44,7 +44,7 @@ use dapple_store::points::LayoutError;
 pub(crate) const MAX_LOCAL_BITS: u32 = 8;
 
 /// What a receiver is willing to take. Every allocation of a decoder is bounded by these, whatever the bytes say:
-/// at most 64 bytes for each of `max_points`, 256 for each of `max_sets`, 32 for each of `max_cuts`, 40 for each of `max_light_values`, and 8 MiB.
+/// at most 64 bytes for each of `max_points`, 256 for each of `max_sets`, 32 for each of `max_cuts`, 48 for each of `max_light_values`, and 8 MiB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Longest frame, bytes. Default 64 MiB.

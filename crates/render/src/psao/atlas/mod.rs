@@ -119,7 +119,7 @@ pub struct VisibilityAtlas {
     has_leans: bool,
 }
 
-/// Why an instance cannot be shown with its visibility.
+/// Why an instance cannot be shown with its visibility, or lights with theirs.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BuildError {
     /// Lights of more texels than fit.

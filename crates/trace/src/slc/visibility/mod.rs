@@ -50,7 +50,7 @@ impl Default for VisibilityParams {
 pub struct VisibilityCounts {
     /// Pairs of a point and a light that were looked at again.
     pub traced: u64,
-    /// Of these, whose value is another.
+    /// Of these, whose value is another, or leans elsewhere.
     pub changed: u64,
     /// Rays.
     pub rays: u64,
