@@ -247,12 +247,12 @@ fn leans_go_along_and_small_turns_wait() {
     assert_eq!(ends.values(), last.lights().unwrap().values());
     let off = |(held, wanted): (Lean, &Lean)| held.is_far_from(*wanted);
     assert!(!leans(&ends).into_iter().zip(last.lights().unwrap().leans()).any(off));
-    // Shares come first: as many bytes as they take alone have no turns in them.
+    // Under a limit shares are still exact where they fit.
     let next = at(21.0, -4);
     let (mut twin, _) = Ends::new(&store(&layout, 1, last.lights().unwrap().values().to_vec()));
     let alone =
         twin.publish(&store(&layout, 1, next.lights().unwrap().values().to_vec()), &Spending::default());
-    let room = Spending { most_bytes: Some(2 * alone + 200), ..Spending::default() };
+    let room = Spending { most_bytes: Some(4 * alone + 200), ..Spending::default() };
     assert!(ends.publish(&next, &room) > 0);
     assert_eq!(ends.values(), next.lights().unwrap().values());
 }

@@ -189,7 +189,7 @@ fn the_lean_vectors_are_those_of_the_encoder_and_decode() {
     let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
     let mut subscriber = Subscriber::new(None, Limits::default());
     let snapshot = publisher.publish(&store).unwrap();
-    let change = |index, [old, new], [old_lean, new_lean]: [[i8; 2]; 2]| LightChange {
+    let change = |index, [old, new]: [u8; 2], [old_lean, new_lean]: [[i8; 2]; 2]| LightChange {
         index,
         old,
         new,

@@ -36,11 +36,11 @@ fn area_reflected(r: Reflectance, s: AreaSurface, atlas: vec3<f32>, texel: vec2<
         // Four lights share a texel.
         if place_in_group == 0 {
             let first = (slot / 4) * group_layers;
-            fractions = area_texel(atlas, texel, first, vec4(1.0));
+            fractions = area_atlas_texel(atlas, texel, first, vec4(1.0));
             if shows_leans && any(fractions > vec4(0.0)) {
                 let middle = vec4(128.0 / 255.0);
-                leans[0] = (area_texel(atlas, texel, first + layers, middle) - middle) * (255.0 / 127.0);
-                leans[1] = (area_texel(atlas, texel, first + 2 * layers, middle) - middle) * (255.0 / 127.0);
+                leans[0] = (area_atlas_texel(atlas, texel, first + layers, middle) - middle) * (255.0 / 127.0);
+                leans[1] = (area_atlas_texel(atlas, texel, first + 2 * layers, middle) - middle) * (255.0 / 127.0);
             }
         } else {
             fractions = vec4(fractions.yzw, 1.0);
@@ -61,7 +61,7 @@ fn area_reflected(r: Reflectance, s: AreaSurface, atlas: vec3<f32>, texel: vec2<
 }
 
 // Four bytes from the layers after `first`: how much is seen of four lights, or where on two of them.
-fn area_texel(atlas: vec3<f32>, texel: vec2<u32>, first: i32, otherwise: vec4<f32>) -> vec4<f32> {
+fn area_atlas_texel(atlas: vec3<f32>, texel: vec2<u32>, first: i32, otherwise: vec4<f32>) -> vec4<f32> {
     if (frame.area_lights >> 16u) == 0u {
         return otherwise;
     }

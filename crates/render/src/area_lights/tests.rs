@@ -262,7 +262,7 @@ fn highlights_of_lights_half_hidden_are_of_the_half_that_is_seen() {
             }
         }
         println!("{name}: off by {} without leans, {} with", whole / total, leaning / total);
-        assert!(leaning < 0.6 * whole, "{name}: {leaning}, {whole} of {total}");
+        assert!(leaning < 0.7 * whole, "{name}: {leaning}, {whole} of {total}");
     }
 }
 
