@@ -4,7 +4,7 @@
 mod scenes;
 
 use dapple_store::cells::CellChanges;
-use dapple_store::light_visibility::{LightChange, LightVisibility};
+use dapple_store::light_visibility::{Lean, LightChange, LightVisibility};
 use dapple_store::points::{BentChange, BentNormal, Change, PointStore};
 use dapple_stream::cells::{CellCodec, CellPublisher};
 use dapple_stream::{
@@ -69,12 +69,15 @@ pub(crate) fn sample() -> PointStore {
     Input(&bytes).store()
 }
 
-/// The sample with bent normals and two lights.
+/// The sample with bent normals, and two lights with leans.
 pub(crate) fn bent_sample() -> PointStore {
     let plane = |step: u8| sample().visibility().iter().map(|v| (v >> 1) + step).collect();
     let sample = sample();
     let values = (0..2).flat_map(|light| sample.visibility().iter().map(move |v| v >> (3 + light)));
-    let lights = LightVisibility::new(sample.layout(), 2, values.collect()).expect("two a point");
+    let values: Vec<u8> = values.collect();
+    let leans = values.iter().map(|value| Lean([(value % 9) as i8 - 4, 1]).of_value(*value)).collect();
+    let lights = LightVisibility::new(sample.layout(), 2, values).expect("two a point");
+    let lights = lights.with_leans(leans).expect("one a value");
     let bent = sample.clone().with_bent([plane(0), plane(64)]).expect("one a point");
     bent.with_lights(lights).expect("of the same points")
 }
@@ -129,7 +132,8 @@ pub fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
     let turn = |point| BentChange { point, old, new: BentNormal([90, 160]) };
     turned.apply_bent(&[turn(30), turn(31)]).expect("they exist");
     turned.apply(&[Change { point: 31, visibility: 3 }]).expect("it exists");
-    let dim = |index| LightChange { index, old: 0, new: 9 };
+    let new_lean = Lean([-3, 2]);
+    let dim = |index| LightChange { index, new: 9, new_lean, ..LightChange::default() };
     turned.apply_lights(&[dim(3), dim(4), dim(5)]).expect("they exist");
     frame("bent-delta", &publish(&mut bent, &turned));
     let less = turned.with_sets(&[first], &PointStore::default()).expect("it is there");

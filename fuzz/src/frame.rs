@@ -95,6 +95,13 @@ fn receive_part(frame: &[u8]) {
                             store.lights().map(|l| l.of_light(light)[values(first)].to_vec())
                         };
                         assert_eq!(of(whole, place.first), of(held, set.first));
+                        let leans = |store: &PointStore, first| {
+                            store
+                                .lights()
+                                .and_then(|l| Some(l.leans_of_light(light).get(values(first))?.to_vec()))
+                        };
+                        let of_part = leans(held, set.first);
+                        assert!(of_part.is_none() || leans(whole, place.first) == of_part);
                     }
                 }
             }

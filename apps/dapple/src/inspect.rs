@@ -47,7 +47,12 @@ pub(crate) fn run(args: &InspectArgs) -> Result<()> {
             say!("           with bent normals");
         }
         if store.light_count() > 0 {
-            say!("lights     {}: how much of each the points see", store.light_count());
+            let leans = if store.lights().is_some_and(|lights| lights.has_leans()) {
+                ", and where on it"
+            } else {
+                ""
+            };
+            say!("lights     {}: how much of each the points see{leans}", store.light_count());
         }
     }
     let per_second = |bytes: u64| if seconds > 0.0 { bytes as f64 * 8e-3 / seconds } else { 0.0 };

@@ -40,6 +40,8 @@ export interface Stats {
   /** Bytes and frames of the stream since the start. */
   bytes: number;
   frames: number;
+  /** Area lights of which the stream says how much is seen. */
+  areaLights: number;
   /** Points of the store, those changed by the last frame, texels of the atlas. */
   points: number;
   changed: number;
@@ -177,6 +179,8 @@ export interface Options {
   halfResolution?: boolean;
   /** Of `sd-ssao` and `sd-hbao-plus` (WebGPU): how far to the right a second camera stands, metres, which sees what the first one looks along. Default none. */
   secondCamera?: number;
+  /** Whether area lights are drawn where the stream says how much of each is seen (`--area-lights`). Default true. */
+  areaLights?: boolean;
   /** Default `beauty`. */
   view?: View;
   /** Another method right of a part (0 to 1) of the width. Default none. */
@@ -271,6 +275,7 @@ export interface Viewer {
   setLoop(loop: boolean): void;
   setMethod(method: Method): void;
   setView(view: View): void;
+  setAreaLights(on: boolean): void;
   /** Another method (default `none`) right of a part of the width; null for one method all over. */
   setSplit(position: number | null, method?: Method): void;
   /** Follows a camera path by name, shows all (`fit`), or looks from a place. */

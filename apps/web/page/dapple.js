@@ -95,10 +95,11 @@ class Viewer {
   #apply() {
     const { method, view, split, camera, time, loop = true, paused = false, fade, live } = this.#options;
     const { fallback, radius = NaN, guardBand = NaN, aoPreset = "high", halfResolution } = this.#options;
-    const { secondCamera = 0 } = this.#options;
+    const { secondCamera = 0, areaLights = true } = this.#options;
     if (method) this.setMethod(method);
     if (fallback) this.#core.setFallback(fallback);
     this.#core.setScreenSpace(radius, guardBand, aoPreset, halfResolution, secondCamera);
+    this.setAreaLights(areaLights);
     if (view) this.setView(view);
     if (split) this.setSplit(split.position, split.method);
     if (camera) this.setCamera(camera);
@@ -411,6 +412,10 @@ class Viewer {
 
   setMethod(method) {
     this.#living().setMethod(method);
+  }
+
+  setAreaLights(on) {
+    this.#living().setAreaLights(on);
   }
 
   setView(view) {

@@ -7,6 +7,7 @@ const byId = (id) => document.getElementById(id);
 const [canvas, ui, loading, stage, bar, message] = ["view", "ui", "loading", "stage", "progress", "message"].map(byId);
 const [play, slider, clock, menu, divider] = ["play", "time", "clock", "menu", "divider"].map(byId);
 const [method, other, what, camera] = ["method", "other", "what", "camera"].map(byId);
+const areaLights = byId("lit");
 // What can be shown can be compared with.
 other.append(...[...method.options].map((option) => option.cloneNode(true)));
 const narrow = matchMedia("(max-width: 640px)");
@@ -18,7 +19,7 @@ const STAGES = {
   light: "Laying out the light",
 };
 const NUMBERS = ["time", "shadowResolution", "samples", "fade", "radius", "guardBand", "secondCamera", "maxPixelRatio", "animation"];
-const FLAGS = ["paused", "loop", "halfResolution"];
+const FLAGS = ["paused", "loop", "halfResolution", "areaLights"];
 const WORDS = ["scene", "stream", "live", "token", "transport", "backend", "method", "fallback", "aoPreset", "view", "camera"];
 
 const session = new SessionPanel();
@@ -97,6 +98,7 @@ function onStats(stats) {
   byId("backend").textContent = stats.backend === "webgpu" ? "WebGPU" : "WebGL2";
   byId("problem").textContent = stats.problem ?? "";
   byId("problem").hidden = stats.problem === null;
+  byId("area-lights").hidden = stats.areaLights === 0;
   showTime(stats);
   session.show(stats.live);
   if (viewer) followCamera();
@@ -198,6 +200,7 @@ function listen() {
     applySplit();
   };
   other.onchange = applySplit;
+  areaLights.onchange = () => viewer.setAreaLights(areaLights.checked);
   what.onchange = () => viewer.setView(what.value);
   camera.onchange = setCamera;
   canvas.addEventListener("pointerup", followCamera);
@@ -228,6 +231,7 @@ function listen() {
       KeyP: save,
       KeyH: () => byId("help-dialog").showModal(),
       KeyV: () => step(what),
+      KeyL: () => byId("area-lights").hidden || areaLights.click(),
       Digit1: () => step(method),
       Digit2: () => step(other),
     }[event.code];
@@ -250,6 +254,7 @@ async function start() {
   const name = options.live ? "Live" : new URL(options.scene, document.baseURI).pathname.split("/").pop();
   document.title = `${name} · Dapple`;
   if (options.method) method.value = options.method;
+  areaLights.checked = options.areaLights ?? true;
   if (options.view) what.value = options.view;
   if (options.split) {
     splitAt = options.split.position;

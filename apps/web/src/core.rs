@@ -277,6 +277,13 @@ impl Core {
         Ok(())
     }
 
+    /// Whether area lights are drawn whose visibility the stream has.
+    #[wasm_bindgen(js_name = setAreaLights)]
+    pub fn set_area_lights(&mut self, on: bool) {
+        self.options.area_lights = on;
+        self.changed = true;
+    }
+
     /// What is shown, by name.
     #[wasm_bindgen(js_name = setView)]
     pub fn set_view(&mut self, name: &str) -> Result<(), JsError> {
@@ -336,6 +343,7 @@ impl Core {
             ("bytes", (stats.bytes_received as f64).into()),
             ("frames", (stats.frames_received as f64).into()),
             ("points", stats.points.into()),
+            ("areaLights", stats.area_lights.into()),
             ("changed", stats.changed.into()),
             ("texels", stats.texels.into()),
             ("memoryBytes", (heap_bytes as f64).into()),

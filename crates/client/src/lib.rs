@@ -31,6 +31,7 @@ use dapple_scene::area_lights::AreaLights;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Edits, Pose, PosedCamera, Scene};
 use dapple_store::charts::Cuts;
+use dapple_store::light_visibility::SeenLight;
 use dapple_store::points::PointStore;
 use dapple_stream::{Applied, Limits, ReceiveError, Subscriber};
 
@@ -215,9 +216,9 @@ impl Client {
         let points = shading_points(scene, pose, camera, gbuffer, shade.specular);
         let store = self.subscriber.store().filter(|store| store.lights().is_some());
         let atlas = store.map(|store| self.atlas_of(store));
-        shade_area_lights(&points, &table, |sample, fractions| match atlas {
-            Some(atlas) => atlas.look_up_lights(&gbuffer.samples()[sample], table.lights(), fractions),
-            None => fractions.fill(1.0),
+        shade_area_lights(&points, &table, |sample, seen| match atlas {
+            Some(atlas) => atlas.look_up_lights(&gbuffer.samples()[sample], table.lights(), seen),
+            None => seen.fill(SeenLight::ALL),
         })
     }
 
@@ -247,7 +248,10 @@ fn complete(atlas: &mut VisibilityAtlas, scene: &Scene, store: &PointStore) {
     if let Some(lights) = store.lights()
         && lights.lights() as usize == AreaLights::new(scene, &scene.pose_undeformed(0.0)).len()
     {
-        atlas.resolve_lights(lights);
+        // Of more than fit nothing is known, as before the first snapshot.
+        if atlas.resolve_lights(lights).is_err() {
+            atlas.forget_lights();
+        }
     }
 }
 

@@ -33,7 +33,7 @@ pub(crate) use planes::{PLANES, planes};
 #[cfg(feature = "publish")]
 pub(crate) use sets::sets_head;
 pub(crate) use sets::{DecodedSets, decode_sets_change};
-pub(crate) use values::{BLOCK, Back, Near, SHARES, Scratch};
+pub(crate) use values::{BLOCK, Back, Candidates, Near, SHARES, Scratch};
 #[cfg(feature = "publish")]
 pub(crate) use values::{Fit, Goal, LEAF, Tolerances};
 pub use values::{ValueChange, first_chances};
@@ -44,7 +44,7 @@ use dapple_store::points::LayoutError;
 pub(crate) const MAX_LOCAL_BITS: u32 = 8;
 
 /// What a receiver is willing to take. Every allocation of a decoder is bounded by these, whatever the bytes say:
-/// at most 64 bytes for each of `max_points`, 256 for each of `max_sets`, 32 for each of `max_cuts`, 40 for each of `max_light_values`, and 8 MiB.
+/// at most 64 bytes for each of `max_points`, 256 for each of `max_sets`, 32 for each of `max_cuts`, 48 for each of `max_light_values`, and 8 MiB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Longest frame, bytes. Default 64 MiB.
@@ -140,12 +140,12 @@ pub enum DecodeError {
 }
 
 /// Maps small differences of either sign, modulo 256, to small bytes.
-fn zigzag(difference: u8) -> u8 {
+pub(crate) fn zigzag(difference: u8) -> u8 {
     let d = difference as i8;
     ((d << 1) ^ (d >> 7)) as u8
 }
 
 /// The inverse of [`zigzag`].
-fn unzigzag(code: u8) -> u8 {
+pub(crate) fn unzigzag(code: u8) -> u8 {
     (code >> 1) ^ (code & 1).wrapping_neg()
 }

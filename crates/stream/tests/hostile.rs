@@ -8,7 +8,7 @@ mod cloud;
 use std::sync::LazyLock;
 
 use dapple_store::charts::{Cuts, SetCuts, SiteCut};
-use dapple_store::light_visibility::LightVisibility;
+use dapple_store::light_visibility::{Lean, LightVisibility};
 use dapple_store::points::{Change, PackedNormal, PointLayout, PointSet, PointStore};
 use dapple_stream::codec::seal;
 use dapple_stream::{
@@ -55,13 +55,15 @@ static SETS: LazyLock<Vec<u8>> = LazyLock::new(|| {
     publisher.publish(&next).unwrap().bytes.to_vec()
 });
 
-/// The sample with bent normals and two lights: its snapshot (epoch 0), the delta to a later state (1), and a change of sets (2).
+/// The sample with bent normals and two lights with leans: its snapshot (epoch 0), the delta to a later state (1), and a change of sets (2).
 static BENT: LazyLock<[Vec<u8>; 3]> = LazyLock::new(|| {
     let bent = |store: PointStore| {
         let plane = |turn: u8| store.visibility().iter().map(|v| v.rotate_left(turn.into())).collect();
         let planes = [plane(1), plane(3)];
         let values = (0..2).flat_map(|light| store.visibility().iter().map(move |v| v >> (3 + light)));
-        let lights = LightVisibility::new(store.layout(), 2, values.collect()).unwrap();
+        let values: Vec<u8> = values.collect();
+        let leans = values.iter().map(|value| Lean([(value % 9) as i8 - 4, 1]).of_value(*value)).collect();
+        let lights = LightVisibility::new(store.layout(), 2, values).unwrap().with_leans(leans).unwrap();
         store.with_bent(planes).unwrap().with_lights(lights).unwrap()
     };
     let store = cloud::hall(3, 3000);
@@ -440,7 +442,13 @@ fn what_breaks_the_rules_of_bent_normals_is_named() {
     // Bits that mean nothing.
     let mut snapshot = payload(&BENT[0]);
     let flags = 32 + 2 + 8;
-    assert!(snapshot[flags] >= 0xc0 && snapshot[flags] & 0x3f <= 8, "{:x?}", &snapshot[32..50]);
-    snapshot[flags] |= 0x20;
+    assert!(snapshot[flags] >= 0xe0 && snapshot[flags] & 0x1f <= 8, "{:x?}", &snapshot[32..50]);
+    snapshot[flags] |= 0x10;
     malformed(&mut Subscriber::new(None, Limits::default()), FrameKind::Snapshot, 0, &snapshot, "local bits");
+    // Leans without lights, and sets without leans beside sets with some.
+    snapshot[flags] &= !0x50;
+    malformed(&mut Subscriber::new(None, Limits::default()), FrameKind::Snapshot, 0, &snapshot, "local bits");
+    let mut without = payload(&BENT[2]);
+    without[12] &= !0x20;
+    malformed(&mut bent(2), FrameKind::Sets, 2, &without, "where what is seen");
 }

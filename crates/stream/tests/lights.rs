@@ -6,7 +6,7 @@ mod common;
 
 use std::sync::Arc;
 
-use dapple_store::light_visibility::{LightVisibility, OPEN, quantized};
+use dapple_store::light_visibility::{Lean, LightVisibility, OPEN, quantized};
 use dapple_store::points::{PointLayout, PointStore};
 use dapple_stream::{Limits, Parts, Publisher, PublisherConfig, Spending, Subscriber};
 use proptest::prelude::*;
@@ -194,4 +194,65 @@ fn what_goes_on_changing_does_not_keep_the_rest_waiting() {
         assert!(frames < 400, "it waits for ever");
     }
     assert!(frames > 1);
+}
+
+/// Half of what is seen leans along with a shadow's edge: exact at both ends, in a snapshot and in changes; what turns a little waits.
+#[test]
+fn leans_go_along_and_small_turns_wait() {
+    let layout = floor(0, 40);
+    let at = |edge: f32, turn: i8| {
+        let positions = &layout.sets()[0].positions;
+        let distance = |p: &[u32; 3]| (p[0] as f32 + 0.3 * p[2] as f32) / 8.0 - edge;
+        let values: Vec<u8> = positions.iter().map(|p| quantized(0.5 + 0.1 * distance(p))).collect();
+        let lean = |(p, value): (&[u32; 3], &u8)| {
+            let steps = [(4.0 - distance(p).abs()).round() as i8, turn + (p[2] / 64) as i8];
+            Lean(steps).of_value(*value)
+        };
+        let leans: Vec<Lean> = positions.iter().zip(&values).map(lean).collect();
+        let lights = LightVisibility::new(&layout, 1, values).unwrap().with_leans(leans).unwrap();
+        PointStore::new(layout.clone(), vec![255; layout.len()]).unwrap().with_lights(lights).unwrap()
+    };
+    let (mut ends, joined) = Ends::new(&at(10.0, -2));
+    let without = Ends::new(&store(&layout, 1, at(10.0, -2).lights().unwrap().values().to_vec())).1;
+    assert!(joined > without && joined < without + 400, "{joined}, {without} without leans");
+    let leans = |ends: &Ends| ends.subscriber.lights().unwrap().leans().to_vec();
+    assert_eq!(leans(&ends), at(10.0, -2).lights().unwrap().leans());
+    // One step is not worth telling, two are; nothing else changes.
+    assert_eq!(ends.publish(&at(10.0, -1), &Spending::default()), 0);
+    let bytes = ends.publish(&at(10.0, 0), &Spending::default());
+    assert!(bytes > 0);
+    assert_eq!(leans(&ends), at(10.0, 0).lights().unwrap().leans());
+    let changes = ends.subscriber.light_changes();
+    assert!(changes.len() > 100 && changes.iter().all(|c| c.old == c.new && c.old_lean != c.new_lean));
+    // What is sent of the shares has its lean with it; after all of it has been sent exactly, both ends are the same.
+    for step in 1..=12 {
+        ends.publish(&at(10.0 + step as f32, 0), &Spending::default());
+        assert_eq!(ends.values(), at(10.0 + step as f32, 0).lights().unwrap().values());
+        let off = |(held, wanted): (Lean, &Lean)| held.is_far_from(*wanted);
+        assert!(!leans(&ends).into_iter().zip(at(10.0 + step as f32, 0).lights().unwrap().leans()).any(off));
+    }
+    // Light that does not matter need not turn, and a budget leaves turns for later.
+    let all: Vec<(u32, u8)> = (0..1600).map(|index| (index, 255)).collect();
+    let last = at(22.0, 3);
+    assert_eq!(ends.publish(&last, &Spending { light_tolerances: &all, ..Spending::default() }), 0);
+    let small = Spending { most_bytes: Some(60), ..Spending::default() };
+    let mut frames = 0;
+    while ends.publish(&last, &small) > 0 {
+        frames += 1;
+        assert!(frames < 500);
+    }
+    // Where turns do not fit, they are sent as soon as they do.
+    assert!(ends.publish(&last, &Spending::default()) > 0 || frames > 0);
+    assert_eq!(ends.publish(&last, &Spending::default()), 0);
+    assert_eq!(ends.values(), last.lights().unwrap().values());
+    let off = |(held, wanted): (Lean, &Lean)| held.is_far_from(*wanted);
+    assert!(!leans(&ends).into_iter().zip(last.lights().unwrap().leans()).any(off));
+    // Under a limit shares are still exact where they fit.
+    let next = at(21.0, -4);
+    let (mut twin, _) = Ends::new(&store(&layout, 1, last.lights().unwrap().values().to_vec()));
+    let alone =
+        twin.publish(&store(&layout, 1, next.lights().unwrap().values().to_vec()), &Spending::default());
+    let room = Spending { most_bytes: Some(4 * alone + 200), ..Spending::default() };
+    assert!(ends.publish(&next, &room) > 0);
+    assert_eq!(ends.values(), next.lights().unwrap().values());
 }

@@ -11,6 +11,7 @@ use dapple_render::shade::{Gathering, Openings, ShadeParams, shade_gathered, sha
 use dapple_scene::area_lights::AreaLights;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{CameraPath, Pose, PosedCamera, Scene};
+use dapple_store::light_visibility::SeenLight;
 use dapple_trace::Tracer;
 use dapple_trace::direct::{DirectParams, trace_direct};
 
@@ -200,7 +201,7 @@ impl<'a> Stage<'a> {
         let open_light = self.settings.has_area_lights().then(|| {
             let points = shading_points(scene, &drawn.pose, &camera, &drawn.gbuffer, self.shade().specular);
             let table = AreaLightTable::new(&AreaLights::new(scene, &drawn.pose));
-            shade_area_lights(&points, &table, |_, fractions| fractions.fill(1.0))
+            shade_area_lights(&points, &table, |_, seen| seen.fill(SeenLight::ALL))
         });
         let reflected = open_light.as_ref().map(|_| {
             let params = DirectParams {

@@ -118,11 +118,14 @@ impl Light {
         if std::mem::replace(&mut self.lights, count) != count {
             // Others than before: what was taken in is of no use.
             atlas.forget_lights();
-            if let Some(lights) = lights {
-                atlas.resolve_lights(lights);
-            }
+            let taken_in = lights.map_or(Ok(()), |lights| atlas.resolve_lights(lights));
+            self.lights_problem = taken_in.err().map(lights_problem);
         } else if matches!(applied, Applied::Changes(_) | Applied::Sets { .. }) {
             atlas.apply_lights(self.received.light_changes());
+            // There may be room now for what did not fit.
+            if let (Applied::Sets { .. }, Some(lights)) = (applied, lights) {
+                self.lights_problem = atlas.resolve_lights(lights).err().map(lights_problem);
+            }
         }
     }
 
@@ -151,7 +154,9 @@ impl Light {
         let progress = atlas.work(&self.scene, store.visibility(), texels);
         if atlas.ready_count() > before {
             if let Some(lights) = store.lights().filter(|_| self.lights > 0) {
-                atlas.resolve_lights(lights);
+                if let Err(error) = atlas.resolve_lights(lights) {
+                    self.lights_problem = Some(lights_problem(error));
+                }
             }
             // All texels share one fade: it begins anew, for the others from what they show.
             atlas.begin_update(fade_at(self.fade_start_s, now_s, fade_s));
@@ -248,11 +253,15 @@ impl Light {
         atlas.show_lights(shown);
         let bands = bands_of(atlas.take_dirty_lights());
         if !bands.is_empty() {
-            let groups: Vec<_> = atlas.light_texels().iter().map(Vec::as_slice).collect();
-            let uploaded = gpu_scene.upload_lights(gpu, atlas.side(), &groups, &bands);
-            self.lights_problem = uploaded.err().map(|error| format!("area lights: {error}"));
+            let planes: Vec<_> = atlas.light_texels().iter().map(Vec::as_slice).collect();
+            let uploaded = gpu_scene.upload_lights(gpu, atlas.side(), &planes, atlas.shows_leans(), &bands);
+            self.lights_problem = uploaded.err().map(lights_problem);
         }
     }
+}
+
+fn lights_problem(error: impl std::fmt::Display) -> String {
+    format!("area lights: {error}")
 }
 
 fn bands_of(dirty: Vec<DirtyBand>) -> Vec<AtlasBand> {

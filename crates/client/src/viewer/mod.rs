@@ -25,6 +25,7 @@ use dapple_render::forward::{
 use dapple_render::screen_space::{ScreenKind, ScreenPasses};
 use dapple_render::shade::ShadeParams;
 use dapple_scene::{Edits, Pose, PosedCamera, Scene};
+use dapple_store::light_visibility::LightVisibility;
 use dapple_store::points::PointStore;
 use dapple_stream::{Applied, ReceiveError};
 
@@ -304,12 +305,15 @@ impl Viewer {
     /// Figures for an overlay. Looks at all that is held: a few times a second is enough.
     pub fn stats(&self) -> ViewerStats {
         let bent = self.store().and_then(PointStore::bent).map_or(0, |planes| planes.len() as u64);
-        let store_bytes = self.stats.points as u64 * (BYTES_A_STORED_POINT + bent);
+        let lights = self.store().and_then(PointStore::lights);
+        let store_bytes = self.stats.points as u64 * (BYTES_A_STORED_POINT + bent)
+            + lights.map_or(0, |lights| lights.bytes() as u64);
         let stream_bytes = self.light.received.bytes() as u64;
         let (atlas_bytes, texels) =
             self.light.atlas.as_ref().map_or((0, 0), |a| (a.memory_bytes(), a.texel_count() as u32));
         ViewerStats {
             texels,
+            area_lights: lights.map_or(0, LightVisibility::lights),
             memory_bytes: (store_bytes + stream_bytes + atlas_bytes, self.gpu_scene.bytes()),
             ..self.stats
         }

@@ -207,6 +207,8 @@ impl LoadProgress {
 pub struct ViewerStats {
     /// Points of the store.
     pub points: u32,
+    /// Area lights of which the store says how much points see.
+    pub area_lights: u32,
     /// Bytes received since the start.
     pub bytes_received: u64,
     /// Frames received since the start.

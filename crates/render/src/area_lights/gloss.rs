@@ -3,6 +3,7 @@
 use std::f32::consts::FRAC_1_PI;
 
 use dapple_scene::ShadingPoint;
+use dapple_store::light_visibility::{SeenLight, lean_frame};
 use dapple_store::points::orthonormal_basis;
 use glam::Vec3;
 
@@ -11,6 +12,12 @@ use crate::slc::cap::{EIGHT, FOUR, ONE, Pattern, SIXTEEN};
 
 /// Mean cosine below which a cone is not taken at its word.
 const LEAST_COSINE: f32 = 0.01;
+
+/// Lean, in angular radii, below which there is none: two steps of a texel.
+const LEAST_LEAN: f32 = 1.0 / 64.0;
+
+/// Alpha from which on it is not seen which part of a light is hidden.
+const ROUGH_ALPHA: f32 = 0.36;
 
 /// A surface about to be lit.
 pub(super) struct Surface<'a> {
@@ -61,6 +68,28 @@ impl<'a> Surface<'a> {
             false => r.diffuse * (FRAC_1_PI * sums.cosine),
         };
         arrival.irradiance * reflected / sums.over.max(LEAST_COSINE * count as f32)
+    }
+
+    /// The cone of what is seen of a light, of the irradiance of all of it: it leans to where that lies, and is as much smaller as a part must be that lies there.
+    /// Nothing is made of it on surfaces that are too rough to show it.
+    pub(super) fn seen(&self, arrival: &Arrival, seen: &SeenLight) -> Arrival {
+        let [x, y] = seen.lean;
+        let far = (x * x + y * y).sqrt().min(1.0);
+        let depth = 1.0 - arrival.cos_angle;
+        // Beyond a hemisphere there is no side.
+        if far < LEAST_LEAN || depth >= 1.0 || self.point.reflectance.alpha >= ROUGH_ALPHA {
+            return *arrival;
+        }
+        let sine = (depth * (2.0 - depth)).max(0.0).sqrt();
+        let [across, along] = lean_frame(arrival.direction);
+        let leaning = arrival.direction + (across * x + along * y) * sine;
+        // Not below the horizon: what is seen gives the irradiance that it gives.
+        let normal = self.point.normal_shading_world;
+        let lacks = (0.5 * normal.dot(arrival.direction) - normal.dot(leaning)).max(0.0);
+        let Some(direction) = (leaning + normal * lacks).try_normalize() else { return *arrival };
+        // A part in the middle of which all is symmetric may be the rim as well as the core; one at the rim has only so much room.
+        let part = seen.fraction.max((1.0 - far) * (1.0 - far));
+        Arrival { direction, cos_angle: 1.0 - depth * part, ..*arrival }
     }
 
     /// Directions that a cone needs on this surface, as [`Samples::Adaptive`](crate::slc::Samples::Adaptive).

@@ -1,7 +1,7 @@
 //! Reflects light of area lights by their shapes, with soft shadows from how much of each light points see.
 //!
-//! - takes: shading points ([`crate::shade::shading_points`]), an [`AreaLightTable`] of the moment, and for each point the visible
-//!   fraction of each light ([`VisibilityAtlas::look_up_lights`](crate::psao::atlas::VisibilityAtlas::look_up_lights))
+//! - takes: shading points ([`crate::shade::shading_points`]), an [`AreaLightTable`] of the moment, and for each point what is seen
+//!   of each light ([`VisibilityAtlas::look_up_lights`](crate::psao::atlas::VisibilityAtlas::look_up_lights))
 //! - returns: radiance that each point reflects of them; what surfaces emit themselves is [`crate::shade`]'s
 //!
 //! No ray is traced. Equations, parameters and failure cases in `README.md`.
@@ -15,6 +15,7 @@ mod tests;
 
 use dapple_scene::ShadingPoint;
 use dapple_scene::area_lights::{AreaLights, LightFigure};
+use dapple_store::light_visibility::SeenLight;
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -91,22 +92,22 @@ impl AreaLightTable {
     }
 }
 
-/// Radiance that points reflect of area lights; 0 where there is no point. `fractions` is asked for the visible fraction, 0 … 1, of each of
+/// Radiance that points reflect of area lights; 0 where there is no point. `look_up` is asked for what is seen of each of
 /// [`AreaLightTable::lights`] at the point of an index. In parallel in the caller's rayon pool.
 ///
 /// What points emit is not in it: a picture has that already ([`crate::shade::shade`]).
 pub fn shade_area_lights(
     points: &[Option<ShadingPoint>],
     table: &AreaLightTable,
-    fractions: impl Fn(usize, &mut [f32]) + Sync,
+    look_up: impl Fn(usize, &mut [SeenLight]) + Sync,
 ) -> Vec<Vec3> {
     if table.is_dark() {
         return vec![Vec3::ZERO; points.len()];
     }
-    let row = || vec![1.0f32; table.lights.len()];
-    let reflect = |row: &mut Vec<f32>, (i, point): (usize, &Option<ShadingPoint>)| match point {
+    let row = || vec![SeenLight::ALL; table.lights.len()];
+    let reflect = |row: &mut Vec<SeenLight>, (i, point): (usize, &Option<ShadingPoint>)| match point {
         Some(point) => {
-            fractions(i, row);
+            look_up(i, row);
             reflect_one(point, table, row)
         }
         None => Vec3::ZERO,
@@ -114,20 +115,20 @@ pub fn shade_area_lights(
     points.par_iter().enumerate().with_min_len(256).map_init(row, reflect).collect()
 }
 
-fn reflect_one(point: &ShadingPoint, table: &AreaLightTable, fractions: &[f32]) -> Vec3 {
+fn reflect_one(point: &ShadingPoint, table: &AreaLightTable, seen: &[SeenLight]) -> Vec3 {
     let r = &point.reflectance;
     if r.diffuse == Vec3::ZERO && (r.f0 == Vec3::ZERO || !r.specular) {
         return Vec3::ZERO;
     }
     let surface = Surface::of(point);
     let mut sum = Vec3::ZERO;
-    for (slot, &fraction) in fractions.iter().enumerate() {
-        if fraction <= 0.0 {
+    for (slot, seen) in seen.iter().enumerate() {
+        if seen.fraction <= 0.0 {
             continue;
         }
         let arrival = table.arrival(slot, point.position_world, point.normal_shading_world);
         let Some(arrival) = arrival else { continue };
-        sum += surface.reflect(&arrival) * fraction;
+        sum += surface.reflect(&surface.seen(&arrival, seen)) * seen.fraction;
     }
     sum
 }

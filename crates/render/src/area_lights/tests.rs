@@ -4,6 +4,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 use dapple_scene::area_lights::EmitterShape;
 use dapple_scene::{Material, Mesh, Reflectance};
+use dapple_store::light_visibility::{Lean, lean_frame};
 use glam::{Affine3A, Mat3, Vec2};
 
 use super::*;
@@ -196,7 +197,9 @@ fn what_is_reflected_is_what_many_places_give() {
                         }
                         let point = surface(roughness, metallic, specular, position, normal, viewer);
                         let exact = summed(&stage, position, |l| point.reflected(l));
-                        let half = shade_area_lights(&[Some(point), None], &table, |_, row| row.fill(0.5));
+                        let half = shade_area_lights(&[Some(point), None], &table, |_, row| {
+                            row.fill(SeenLight::of(0.5))
+                        });
                         assert_eq!(half[1], Vec3::ZERO);
                         difference += (half[0] * 2.0 - exact).abs().element_sum();
                         total += exact.element_sum();
@@ -207,6 +210,59 @@ fn what_is_reflected_is_what_many_places_give() {
             println!("{name}, roughness {roughness}, metallic {metallic}, gloss {specular}: {error}");
             assert!(error < most + tolerance, "{name} at roughness {roughness}: {error}");
         }
+    }
+}
+
+/// A half or a sliver of each light is hidden by something with a straight edge: highlights are where the rest is, and as large.
+#[test]
+fn highlights_of_lights_half_hidden_are_of_the_half_that_is_seen() {
+    for (name, stage, _) in kinds().into_iter().take(5) {
+        let table = table(&stage);
+        let (mut whole, mut leaning, mut total) = (0.0, 0.0, 0.0);
+        for (towards, turn) in directions(12).zip(0u8..) {
+            let position = towards * 4.0;
+            let normal = (-towards + Vec3::new(0.2, 0.5, -0.3)).normalize();
+            let edge = (-towards).any_orthonormal_vector();
+            let edge =
+                edge * (0.3 * f32::from(turn)).cos() + edge.cross(towards) * (0.3 * f32::from(turn)).sin();
+            for offset in [0.0, -0.08, 0.08] {
+                let is_seen = |l: Vec3| if edge.dot(l) > offset { 1.0 } else { 0.0 };
+                let cosine = |l: Vec3| normal.dot(l).max(0.0);
+                let share = |l: Vec3| cosine(l) * RADIANCE.recip().x;
+                let [all, seen] = [false, true].map(|only_seen| {
+                    // As a server does it: the middle of what arrives.
+                    let weight = |l: Vec3| share(l) * if only_seen { is_seen(l) } else { 1.0 };
+                    summed(&stage, position, |l| l * weight(l)) / RADIANCE * RADIANCE.x
+                });
+                let amounts = [
+                    summed(&stage, position, |l| Vec3::splat(cosine(l))),
+                    summed(&stage, position, |l| Vec3::splat(cosine(l) * is_seen(l))),
+                ];
+                let fraction = amounts[1].x / amounts[0].x;
+                if !(0.1..0.9).contains(&fraction) {
+                    continue;
+                }
+                let size = summed(&stage, position, |_| Vec3::ONE).x / RADIANCE.x;
+                let depth = 2.0 * (1.0 - (summed(&stage, position, |l| l) / RADIANCE).length() / size);
+                let axis = all.normalize();
+                let shift = (seen.normalize() - axis) / (depth * (2.0 - depth)).sqrt();
+                let lean = Lean::quantized(lean_frame(axis).map(|across| across.dot(shift))).radii();
+                for aside in [Vec3::ZERO, Vec3::X * 0.15, Vec3::new(0.1, -0.2, 0.2)] {
+                    let viewer = (towards + normal * (2.0 * -towards.dot(normal)) + aside).normalize();
+                    let point = surface(0.25, 1.0, true, position, normal, viewer);
+                    let exact = summed(&stage, position, |l| point.reflected(l) * is_seen(l));
+                    let of = |lean: [f32; 2]| {
+                        let seen = SeenLight { fraction, lean };
+                        shade_area_lights(&[Some(point)], &table, |_, row| row.fill(seen))[0]
+                    };
+                    whole += (of([0.0; 2]) - exact).abs().element_sum();
+                    leaning += (of(lean) - exact).abs().element_sum();
+                    total += exact.element_sum();
+                }
+            }
+        }
+        println!("{name}: off by {} without leans, {} with", whole / total, leaning / total);
+        assert!(leaning < 0.7 * whole, "{name}: {leaning}, {whole} of {total}");
     }
 }
 
@@ -230,7 +286,8 @@ fn no_light_gives_more_than_light_from_all_sides() {
                         "{name}"
                     );
                     let point = surface(0.1, 0.0, true, position, normal, normal);
-                    let reflected = shade_area_lights(&[Some(point)], &table, |_, row| row.fill(1.0));
+                    let reflected =
+                        shade_area_lights(&[Some(point)], &table, |_, row| row.fill(SeenLight::ALL));
                     assert!(reflected[0].is_finite(), "{name} {reflected:?}");
                 }
             }
@@ -241,7 +298,7 @@ fn no_light_gives_more_than_light_from_all_sides() {
         let stage = lit(ground(1e3), EmitterShape::Rectangle, facing_down(height, Vec3::ONE), false);
         let mut point = surface(1.0, 0.0, false, Vec3::new(3.0, 0.0, -7.0), Vec3::Y, Vec3::Y);
         point.reflectance.diffuse = Vec3::ONE;
-        let reflected = shade_area_lights(&[Some(point)], &table(&stage), |_, row| row.fill(1.0));
+        let reflected = shade_area_lights(&[Some(point)], &table(&stage), |_, row| row.fill(SeenLight::ALL));
         assert!((reflected[0] / RADIANCE - 1.0).abs().max_element() < 5e-3, "{reflected:?}");
     }
 }
@@ -273,11 +330,11 @@ fn what_is_dark_gone_or_without_area_gives_nothing() {
         let table = table(stage);
         assert_eq!(table.lights(), [0, 1, 2, 3, 4, 5]);
         assert!((1..6).all(|slot| table.arrival(slot, Vec3::ZERO, Vec3::Y).is_none()));
-        shade_area_lights(&[Some(point)], &table, |_, row| row.fill(1.0))[0]
+        shade_area_lights(&[Some(point)], &table, |_, row| row.fill(SeenLight::ALL))[0]
     };
     let lit = shade(&stage);
     assert!(lit.is_finite() && lit.min_element() > 0.0, "{lit}");
-    let none = shade_area_lights(&[Some(point)], &table(&stage), |_, row| row.fill(0.0));
+    let none = shade_area_lights(&[Some(point)], &table(&stage), |_, row| row.fill(SeenLight::of(0.0)));
     assert_eq!(none, [Vec3::ZERO], "nothing of it is seen, and nothing emitted is added");
     stage.pose.instances[0].world_from_mesh = Affine3A::from_mat3(Mat3::ZERO);
     assert!(table(&stage).is_dark());

@@ -7,14 +7,15 @@ use super::atlas::{AtlasBand, AtlasTexture};
 use super::tables::{float_table, write_rows};
 use crate::area_lights::table::TABLE_WIDTH;
 use crate::area_lights::{AreaLightTable, MAX_AREA_LIGHTS};
-use crate::psao::atlas::LIGHTS_A_TEXEL;
+use crate::psao::atlas::{LIGHTS_A_TEXEL, PLANES_WITH_LEANS};
 
 /// What `reflect.wgsl` reads.
 #[derive(Debug)]
 pub(super) struct AreaLightTextures {
     atlas: AtlasTexture<LIGHTS_A_TEXEL>,
-    /// Groups of four lights in the atlas, and layers of each.
-    groups: u32,
+    /// Planes of all groups of four lights in the atlas, and layers of each.
+    planes: u32,
+    has_leans: bool,
     layers: u32,
     /// One row a light; one texel until there are some.
     table: wgpu::Texture,
@@ -29,7 +30,8 @@ impl AreaLightTextures {
         let (table, table_view) = make_table(gpu, 1, 1);
         AreaLightTextures {
             atlas: AtlasTexture::new(gpu),
-            groups: 0,
+            planes: 0,
+            has_leans: false,
             layers: 0,
             table,
             table_view,
@@ -66,17 +68,18 @@ impl AreaLightTextures {
         is_first
     }
 
-    /// Writes bands of the layers of all groups; returns whether groups must be made anew.
+    /// Writes bands of the layers of all planes; returns whether groups must be made anew.
     pub(super) fn upload(
         &mut self,
         gpu: &Gpu,
         side: u32,
-        groups: &[&[[u8; LIGHTS_A_TEXEL]]],
+        planes: &[&[[u8; LIGHTS_A_TEXEL]]],
+        has_leans: bool,
         bands: &[AtlasBand],
     ) -> Result<bool, ForwardError> {
         let area = side as usize * side as usize;
-        let texels = groups.first().map_or(0, |group| group.len());
-        if let Some(other) = groups.iter().find(|group| group.len() != texels) {
+        let texels = planes.first().map_or(0, |plane| plane.len());
+        if let Some(other) = planes.iter().find(|plane| plane.len() != texels) {
             return Err(ForwardError::AtlasLength { found: other.len(), expected: texels });
         }
         if area == 0 || !texels.is_multiple_of(area) {
@@ -84,22 +87,22 @@ impl AreaLightTextures {
         }
         let layers = (texels / area) as u32;
         let all: Vec<&[[u8; LIGHTS_A_TEXEL]]> =
-            groups.iter().flat_map(|group| group.chunks_exact(area)).collect();
-        let of_group = |group: u32| {
+            planes.iter().flat_map(|plane| plane.chunks_exact(area)).collect();
+        let of_plane = |plane: u32| {
             bands
                 .iter()
                 .filter(|band| band.layer < layers)
-                .map(move |band| AtlasBand { layer: group * layers + band.layer, ..*band })
+                .map(move |band| AtlasBand { layer: plane * layers + band.layer, ..*band })
         };
-        // Another number of groups with as many layers in all would take one's layers for another's.
-        let is_other = (self.groups, self.layers) != (groups.len() as u32, layers);
+        // Another number of planes with as many layers in all would take one's layers for another's.
+        let is_other = (self.planes, self.layers) != (planes.len() as u32, layers);
         let whole = |layer: u32| AtlasBand { layer, first_row: 0, end_row: side };
         let bands: Vec<AtlasBand> = match is_other {
             true => (0..all.len() as u32).map(whole).collect(),
-            false => (0..groups.len() as u32).flat_map(of_group).collect(),
+            false => (0..planes.len() as u32).flat_map(of_plane).collect(),
         };
         let is_new = self.atlas.upload(gpu, side, &all, &bands)?;
-        (self.groups, self.layers) = (groups.len() as u32, layers);
+        (self.planes, self.layers, self.has_leans) = (planes.len() as u32, layers, has_leans);
         Ok(is_new)
     }
 
@@ -108,11 +111,12 @@ impl AreaLightTextures {
         self.lights > 0
     }
 
-    /// `area_lights` of `frame.wgsl`: lights, and above them layers of a group, 0 where the atlas has not all of them.
+    /// `area_lights` of `frame.wgsl`: lights, above them whether there are leans, and above that layers of a plane, 0 where the atlas has not all lights.
     pub(super) fn code(&self) -> u32 {
-        let has_all = self.groups as usize * LIGHTS_A_TEXEL >= self.lights as usize;
+        let of_group = if self.has_leans { PLANES_WITH_LEANS } else { 1 };
+        let has_all = self.planes as usize / of_group * LIGHTS_A_TEXEL >= self.lights as usize;
         let layers = if has_all { self.layers } else { 0 };
-        self.lights | layers << 16
+        self.lights | u32::from(self.has_leans) << 8 | layers << 16
     }
 
     pub(super) fn atlas_view(&self) -> &wgpu::TextureView {

@@ -17,7 +17,7 @@ pub struct AtlasBand {
 }
 
 /// Square layers of texels with two or four numbers 0 … 1 each (8 bits). Two: the old value and the new one of visibility. Four: how much of
-/// each of four lights is seen.
+/// each of four lights is seen, or where on two of them.
 #[derive(Debug)]
 pub struct AtlasTexture<const BYTES: usize = 2> {
     texture: wgpu::Texture,

@@ -2,7 +2,11 @@
 //!
 //! Rays that find it are `trace`'s, bytes are `stream`'s; `README.md` has what a value means and what it does not.
 
+mod lean;
+
 use crate::points::PointLayout;
+
+pub use lean::{LEAN_STEPS, Lean, SeenLight, lean_frame};
 
 /// The value of a light of which all is seen; 0 is one of which nothing is.
 pub const OPEN: u8 = 31;
@@ -13,17 +17,19 @@ pub const MAX_LIGHTS: u32 = 1 << 12;
 /// Most values, points × lights. Bounds what a decoder allocates.
 pub const MAX_VALUES: usize = 1 << 24;
 
-/// The visibility of lights at the points of a layout, 0 … [`OPEN`].
+/// The visibility of lights at the points of a layout, 0 … [`OPEN`]; with or without where what is seen of a light lies.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LightVisibility {
     points: usize,
     lights: u32,
     /// Light by light.
     values: Vec<u8>,
+    /// As many. [`Lean::NONE`] where all or nothing is seen.
+    leans: Option<Vec<Lean>>,
 }
 
-/// A value that is another now.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// A value that is another now, or leans elsewhere.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LightChange {
     /// Which: light × points + point.
     pub index: u32,
@@ -31,6 +37,10 @@ pub struct LightChange {
     pub old: u8,
     /// What it is now, 0 … [`OPEN`].
     pub new: u8,
+    /// Where what was seen lay; [`Lean::NONE`] where leans are not held.
+    pub old_lean: Lean,
+    /// Where what is seen lies now.
+    pub new_lean: Lean,
 }
 
 /// Why values cannot be held.
@@ -64,6 +74,18 @@ pub enum LightVisibilityError {
         /// What was there.
         value: u8,
     },
+    /// Another number of leans than of values, one that is too far, or one of a value that has none.
+    #[error(
+        "visibility of lights: leans of {leans} values for {values}, the first that does not fit at {index}"
+    )]
+    BadLeans {
+        /// Leans given.
+        leans: usize,
+        /// Values there are.
+        values: usize,
+        /// Where.
+        index: usize,
+    },
     /// A change of a value that is not there.
     #[error("visibility of lights: change of value {index}, there are only {values}")]
     NoSuchValue {
@@ -82,7 +104,7 @@ impl LightVisibility {
     pub fn open(layout: &PointLayout, lights: u32) -> Result<LightVisibility, LightVisibilityError> {
         let points = layout.len();
         let values = check_size(points, lights)?;
-        Ok(LightVisibility { points, lights, values: vec![OPEN; values] })
+        Ok(LightVisibility { points, lights, values: vec![OPEN; values], leans: None })
     }
 
     /// Whether so many can be held.
@@ -109,13 +131,37 @@ impl LightVisibility {
         if let Some(index) = values.iter().position(|&value| value > OPEN) {
             return Err(LightVisibilityError::BadValue { index, value: values[index] });
         }
-        Ok(LightVisibility { points, lights, values })
+        Ok(LightVisibility { points, lights, values, leans: None })
     }
 
-    /// Values that were put together from others, so that each is in range.
-    pub(crate) fn carried(points: usize, lights: u32, values: Vec<u8>) -> LightVisibility {
+    /// The same with where what is seen of each light lies, light by light.
+    ///
+    /// # Errors
+    /// Another number of leans than of values; one beyond [`LEAN_STEPS`]; one other than [`Lean::NONE`] of a value of 0 or [`OPEN`].
+    pub fn with_leans(self, leans: Vec<Lean>) -> Result<LightVisibility, LightVisibilityError> {
+        let fits = |(value, lean): (&u8, &Lean)| *lean == lean.of_value(*value);
+        let bad = self.values.iter().zip(&leans).position(|pair| !fits(pair));
+        if bad.is_some() || leans.len() != self.values.len() {
+            let index = bad.unwrap_or(leans.len().min(self.values.len()));
+            return Err(LightVisibilityError::BadLeans {
+                leans: leans.len(),
+                values: self.values.len(),
+                index,
+            });
+        }
+        Ok(LightVisibility { leans: Some(leans), ..self })
+    }
+
+    /// Values and leans (as many, if any) that were put together from others, so that each is in range.
+    pub(crate) fn carried(
+        points: usize,
+        lights: u32,
+        values: Vec<u8>,
+        leans: Option<Vec<Lean>>,
+    ) -> LightVisibility {
         debug_assert_eq!(values.len(), points * lights as usize);
-        LightVisibility { points, lights, values }
+        debug_assert!(leans.as_ref().is_none_or(|leans| leans.len() == values.len()));
+        LightVisibility { points, lights, values, leans }
     }
 
     /// Number of points of the layout.
@@ -139,6 +185,27 @@ impl LightVisibility {
         self.values.get(start..start + self.points).unwrap_or(&[])
     }
 
+    /// Whether it is held where what is seen of lights lies.
+    pub fn has_leans(&self) -> bool {
+        self.leans.is_some()
+    }
+
+    /// Where what is seen of lights lies, light by light; empty where that is not held.
+    pub fn leans(&self) -> &[Lean] {
+        self.leans.as_deref().unwrap_or(&[])
+    }
+
+    /// The same of one light at all points; empty where that is not held.
+    pub fn leans_of_light(&self, light: u32) -> &[Lean] {
+        let start = light as usize * self.points;
+        self.leans().get(start..start + self.points).unwrap_or(&[])
+    }
+
+    /// Where what is seen lies, of the value of an index; [`Lean::NONE`] where that is not held.
+    pub fn lean(&self, index: usize) -> Lean {
+        self.leans().get(index).copied().unwrap_or_default()
+    }
+
     /// The value of a light at a point, 0 … [`OPEN`]; `None` if there is none.
     pub fn get(&self, point: usize, light: u32) -> Option<u8> {
         self.of_light(light).get(point).copied()
@@ -149,13 +216,18 @@ impl LightVisibility {
         self.get(point, light).map(|value| f32::from(value) / f32::from(OPEN))
     }
 
-    /// Sets one value, at most [`OPEN`], and tells whether it was another; what has no place is left out.
-    pub fn set(&mut self, index: usize, value: u8) -> bool {
+    /// Sets one value, at most [`OPEN`], and where what is seen lies if that is held, and tells whether anything was another; what has no place is left
+    /// out.
+    pub fn set(&mut self, index: usize, value: u8, lean: Lean) -> bool {
         let new = value.min(OPEN);
-        self.values.get_mut(index).is_some_and(|held| std::mem::replace(held, new) != new)
+        let of_value = self.values.get_mut(index).is_some_and(|held| std::mem::replace(held, new) != new);
+        let lean = lean.of_value(new);
+        let held = self.leans.as_mut().and_then(|leans| leans.get_mut(index));
+        let of_lean = held.is_some_and(|held| std::mem::replace(held, lean) != lean);
+        of_value || of_lean
     }
 
-    /// Sets changed values; all or, if one does not fit, none.
+    /// Sets changed values; all or, if one does not fit, none. A lean beyond [`LEAN_STEPS`] counts as one of the rim.
     ///
     /// # Errors
     /// An index that is not there, a value above [`OPEN`].
@@ -173,17 +245,23 @@ impl LightVisibility {
             }
         }
         for change in changes {
-            self.values[change.index as usize] = change.new;
+            self.set(change.index as usize, change.new, change.new_lean);
         }
         Ok(())
+    }
+
+    /// Bytes that values and leans take.
+    pub fn bytes(&self) -> usize {
+        self.values.len() + size_of_val(self.leans())
     }
 
     /// A hash of all that is held, the same on every machine: to compare ends (FNV-1a, 64 bits).
     pub fn hash(&self) -> u64 {
         let sizes = [self.points as u64, u64::from(self.lights)].map(u64::to_le_bytes);
-        let bytes = sizes.iter().flatten().chain(&self.values);
+        let leans = self.leans().iter().flat_map(|lean| lean.0.map(|step| step as u8));
+        let bytes = sizes.iter().flatten().chain(&self.values).copied().chain(leans);
         bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-            (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3)
+            (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
         })
     }
 }
@@ -227,7 +305,7 @@ mod tests {
         );
         assert_eq!(held.fraction(2, 1), Some(1.0));
         let before = (held.clone(), held.hash());
-        let change = |index, new| LightChange { index, old: 0, new };
+        let change = |index, new| LightChange { index, new, ..LightChange::default() };
         let bad = [change(0, 9), change(6, 0)];
         assert_eq!(held.apply(&bad), Err(LightVisibilityError::NoSuchValue { index: 6, values: 6 }));
         assert_eq!(held.apply(&[change(1, 32)]), Err(LightVisibilityError::BadValue { index: 1, value: 32 }));
@@ -237,6 +315,26 @@ mod tests {
         assert_ne!(held.hash(), before.1);
         assert!(LightVisibility::new(&layout, 2, vec![0; 5]).is_err());
         assert!(LightVisibility::new(&layout, 1, vec![0, 32, 0]).is_err());
+    }
+
+    #[test]
+    fn leans_are_of_what_is_half_seen() {
+        let layout = layout(3);
+        let values = LightVisibility::new(&layout, 1, vec![0, 9, OPEN]).unwrap();
+        let [none, some] = [Lean::NONE, Lean([-4, 3])];
+        assert!(!values.has_leans() && values.leans_of_light(0).is_empty() && values.lean(1) == none);
+        let of = |leans: Vec<Lean>| values.clone().with_leans(leans);
+        for bad in [vec![none; 2], vec![none; 4], vec![some, none, none], vec![none, Lean([0, 5]), none]] {
+            assert!(matches!(of(bad), Err(LightVisibilityError::BadLeans { .. })));
+        }
+        let mut held = of(vec![none, some, none]).unwrap();
+        assert_ne!(held.hash(), values.hash());
+        assert_eq!((held.lean(1), held.lean(7), held.leans_of_light(1).len()), (some, none, 0));
+        assert!(!held.set(1, 9, some) && held.set(1, 9, Lean([-4, 2])) && held.set(1, OPEN, some));
+        assert_eq!(held.lean(1), none);
+        held.apply(&[LightChange { index: 0, new: 5, new_lean: Lean([9, 1]), ..LightChange::default() }])
+            .unwrap();
+        assert_eq!(held.lean(0), Lean([4, 1]));
     }
 
     #[test]

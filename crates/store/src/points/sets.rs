@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::layout::MAX_POINTS;
 use super::{BentNormal, LayoutError, PointLayout, PointSet, PointStore};
-use crate::light_visibility::{LightVisibility, OPEN};
+use crate::light_visibility::{Lean, LightVisibility, OPEN};
 
 /// Which sets make the difference between two layouts of the same lengths. A set whose points differ goes and comes.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -116,22 +116,7 @@ impl PointStore {
     /// A set with another number of points than here counts as one that is not there.
     pub fn carried(&self, layout: Arc<PointLayout>, added: &PointStore) -> PointStore {
         let carry = |of: &dyn Fn(&PointStore) -> Option<&[u8]>, otherwise: u8| {
-            let mut values = Vec::with_capacity(layout.len());
-            for set in layout.sets() {
-                let same = |store: &PointStore| {
-                    let found = store.layout().set_of_instance(set.instance).filter(|f| f.len() == set.len());
-                    found.map(|f| f.first as usize..f.first as usize + f.len())
-                };
-                let (store, range) = match (same(added), same(self)) {
-                    (Some(range), _) => (added, range),
-                    (None, Some(range)) => (self, range),
-                    (None, None) => (added, 0..0),
-                };
-                // Of a light that a store does not have there is nothing.
-                values.extend_from_slice(of(store).and_then(|plane| plane.get(range)).unwrap_or(&[]));
-                values.resize(set.first as usize + set.len(), otherwise);
-            }
-            values
+            carry_plane((self, added), &layout, of, otherwise)
         };
         let visibility = carry(&|store| Some(store.visibility.as_slice()), 255);
         let has_bent = self.bent.is_some() || added.bent.is_some();
@@ -143,10 +128,42 @@ impl PointStore {
         let lights = (count > 0).then(|| {
             let of = |light| carry(&|store| store.lights().map(|lights| lights.of_light(light)), OPEN);
             let values = (0..count).flat_map(of).collect();
-            Box::new(LightVisibility::carried(layout.len(), count, values))
+            let has_leans = |store: &PointStore| store.lights().is_some_and(LightVisibility::has_leans);
+            let of = |light| carry_plane((self, added), &layout, leans_of(light), Lean::NONE);
+            let leans = (has_leans(self) || has_leans(added)).then(|| (0..count).flat_map(of).collect());
+            Box::new(LightVisibility::carried(layout.len(), count, values, leans))
         });
         PointStore { layout, visibility, bent, lights }
     }
+}
+
+fn leans_of<'a>(light: u32) -> impl Fn(&'a PointStore) -> Option<&'a [Lean]> {
+    move |store| store.lights().map(|lights| lights.leans_of_light(light))
+}
+
+/// A plane of `layout`: of each set what `added` has, else what `old` has, else this.
+fn carry_plane<'a, T: Copy + 'a>(
+    (old, added): (&'a PointStore, &'a PointStore),
+    layout: &PointLayout,
+    of: impl Fn(&'a PointStore) -> Option<&'a [T]>,
+    otherwise: T,
+) -> Vec<T> {
+    let mut values = Vec::with_capacity(layout.len());
+    for set in layout.sets() {
+        let same = |store: &PointStore| {
+            let found = store.layout().set_of_instance(set.instance).filter(|f| f.len() == set.len());
+            found.map(|f| f.first as usize..f.first as usize + f.len())
+        };
+        let (store, range) = match (same(added), same(old)) {
+            (Some(range), _) => (added, range),
+            (None, Some(range)) => (old, range),
+            (None, None) => (added, 0..0),
+        };
+        // Of a light that a store does not have there is nothing.
+        values.extend_from_slice(of(store).and_then(|plane| plane.get(range)).unwrap_or(&[]));
+        values.resize(set.first as usize + set.len(), otherwise);
+    }
+    values
 }
 
 #[cfg(test)]

@@ -118,7 +118,7 @@ impl PointStore {
     /// Bytes held beside the layout, which is shared.
     pub fn value_bytes(&self) -> usize {
         let bent: usize = self.bent().map_or(0, |planes| planes.iter().map(Vec::len).sum());
-        self.visibility.len() + bent + self.lights().map_or(0, |lights| lights.values().len())
+        self.visibility.len() + bent + self.lights().map_or(0, LightVisibility::bytes)
     }
 
     /// Applies changes; all or, if one is out of range, none.

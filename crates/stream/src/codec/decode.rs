@@ -10,11 +10,11 @@ use glam::Vec3;
 use super::MAX_LOCAL_BITS;
 use super::columns::{CutColumns, PointColumns};
 use super::entropy::{self, Coder};
-use super::planes::{Changes, Extras, HAS_BENT, HAS_LIGHTS, LIGHTS_CHANGE, PLANES, planes};
+use super::planes::{Changes, Extras, HAS_BENT, HAS_LEANS, HAS_LIGHTS, LIGHTS_CHANGE, PLANES, planes};
 use super::values::{Guide, MOST_FOLLOW, Near, Scale, Scratch, code_changes, code_values};
 use super::varint::Reader;
 use super::{DecodeError, Limits};
-use crate::light_visibility::code_light_changes;
+use crate::light_visibility::{LeanCoder, code_light_changes};
 
 /// The parts of a snapshot, the large ones still encoded.
 pub(crate) struct SnapshotParts<'a> {
@@ -54,12 +54,14 @@ pub(crate) fn decode_layout(bytes: &[u8], limits: &Limits) -> Result<DecodedLayo
     let quantum_m = reader.f32("layout lengths")?;
     let spacing_m = reader.f32("layout lengths")?;
     let flags = reader.byte("layout local bits")?;
-    let (local_bits, has_bent) = (u32::from(flags & !(HAS_BENT | HAS_LIGHTS)), flags & HAS_BENT != 0);
+    // Leans alone are none.
+    let lit = if flags & HAS_LIGHTS != 0 { HAS_LIGHTS | HAS_LEANS } else { 0 };
+    let (local_bits, has_bent) = (u32::from(flags & !(HAS_BENT | lit)), flags & HAS_BENT != 0);
     if local_bits > MAX_LOCAL_BITS {
         return Err(bad("layout local bits", "exceed 8"));
     }
     let lights = if flags & HAS_LIGHTS != 0 { decode_light_count(&mut reader)? } else { 0 };
-    let extras = Extras { has_bent, lights };
+    let extras = Extras { has_bent, lights, has_leans: flags & lit & HAS_LEANS != 0 };
     let (mut sets, counts) = decode_sets(&mut reader, limits)?;
     // Sets without points are work for each light too.
     let points = counts.iter().map(|count| *count as u64).sum::<u64>();
@@ -209,14 +211,20 @@ pub(crate) fn decode_values(
 ) -> Result<PointStore, DecodeError> {
     let bad = |reason| DecodeError::Malformed { part: "values", reason };
     let mut reader = entropy::Reader::new(bytes);
-    let mut plane = || code_values(&mut reader, &layout, near, |_| 0).map_err(bad);
-    let visibility = plane()?;
-    let bent = if extras.has_bent { Some([plane()?, plane()?]) } else { None };
+    let plane = |reader: &mut entropy::Reader<'_>| code_values(reader, &layout, near, |_| 0).map_err(bad);
+    let visibility = plane(&mut reader)?;
+    let bent = if extras.has_bent { Some([plane(&mut reader)?, plane(&mut reader)?]) } else { None };
     let mut lights = Vec::with_capacity(layout.len() * extras.lights as usize);
+    let mut leans = Vec::with_capacity(if extras.has_leans { lights.capacity() } else { 0 });
+    let mut coder = LeanCoder::new();
     for _ in 0..extras.lights {
-        let values = plane()?;
+        let values = plane(&mut reader)?;
         if values.iter().any(|value| *value > OPEN) {
             return Err(bad("of a light exceed that of one of which all is seen"));
+        }
+        if extras.has_leans {
+            let of_light = coder.code_all(&mut reader, (&layout, near), &values, None);
+            leans.extend(of_light.ok_or(bad("of lights end early"))?);
         }
         lights.extend(values);
     }
@@ -230,6 +238,10 @@ pub(crate) fn decode_values(
     }
     if extras.lights > 0 {
         let lights = LightVisibility::new(&layout, extras.lights, lights);
+        let lights = lights.and_then(|lights| match extras.has_leans {
+            true => lights.with_leans(leans),
+            false => Ok(lights),
+        });
         let lights = lights.map_err(|_| bad("of lights do not fit the layout"))?;
         store = store.with_lights(lights).map_err(misfit)?;
     }
@@ -300,7 +312,7 @@ pub(crate) fn decode_changes(
     }
     let mut light_changes = Vec::new();
     if let Some(lights) = held.lights().filter(|_| which & LIGHTS_CHANGE != 0) {
-        light_changes = code_light_changes(&mut coded, (held.layout(), near), lights.values(), None)
+        light_changes = code_light_changes(&mut coded, (held.layout(), near), lights, None)
             .ok_or(bad("changes of lights' visibility", "end early"))?;
         if light_changes.is_empty() {
             return Err(bad("changes of lights' visibility", "are none"));

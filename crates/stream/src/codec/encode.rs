@@ -1,15 +1,16 @@
 //! Stores and changes → payloads. Deterministic: the same input gives the same bytes.
 
 use dapple_store::charts::Cuts;
+use dapple_store::light_visibility::LightVisibility;
 use dapple_store::points::{PointLayout, PointStore};
 
 use super::MAX_LOCAL_BITS;
 use super::columns::{CutColumns, PointColumns};
 use super::entropy::Writer;
-use super::planes::{Changes, Extras, HAS_BENT, HAS_LIGHTS, LIGHTS_CHANGE, PLANES, planes};
+use super::planes::{Changes, Extras, HAS_BENT, HAS_LEANS, HAS_LIGHTS, LIGHTS_CHANGE, PLANES, planes};
 use super::values::{Fit, Goal, Near, Scratch, code_changes, code_values};
 use super::varint::write_varint;
-use crate::light_visibility::code_light_changes;
+use crate::light_visibility::{LeanCoder, code_light_changes};
 
 /// The layout part of a snapshot with the cuts that belong to it.
 #[derive(Clone, Debug)]
@@ -29,7 +30,8 @@ pub(crate) fn encode_layout(layout: &PointLayout, cuts: &Cuts, extras: Extras) -
     out.extend(layout.spacing_m().to_le_bytes());
     let bent = if extras.has_bent { HAS_BENT } else { 0 };
     let lights = if extras.lights > 0 { HAS_LIGHTS } else { 0 };
-    out.push(local_bits as u8 | bent | lights);
+    let leans = if extras.has_leans { HAS_LEANS } else { 0 };
+    out.push(local_bits as u8 | bent | lights | leans);
     if extras.lights > 0 {
         write_varint(&mut out, u64::from(extras.lights));
     }
@@ -95,10 +97,20 @@ pub(crate) fn snapshot_payload(
 /// The values of a snapshot, appended to `out`.
 pub(super) fn append_values(out: Vec<u8>, near: &Near, store: &PointStore) -> Vec<u8> {
     let mut writer = Writer::new(out);
-    let lights = store.lights();
-    let lights = lights.into_iter().flat_map(|lights| (0..lights.lights()).map(|l| lights.of_light(l)));
-    for plane in planes(store).chain(lights) {
-        code_values(&mut writer, store.layout(), near, |point| plane[point]).expect("only reading fails");
+    let code = |writer: &mut Writer, plane: &[u8]| {
+        code_values(writer, store.layout(), near, |point| plane[point]).expect("only reading fails");
+    };
+    planes(store).for_each(|plane| code(&mut writer, plane));
+    if let Some(lights) = store.lights() {
+        let mut leans = LeanCoder::new();
+        for light in 0..lights.lights() {
+            let (values, wanted) = (lights.of_light(light), lights.leans_of_light(light));
+            code(&mut writer, values);
+            if lights.has_leans() {
+                let coded = leans.code_all(&mut writer, (store.layout(), near), values, Some(wanted));
+                debug_assert!(coded.is_some(), "only reading fails");
+            }
+        }
     }
     writer.finish()
 }
@@ -110,7 +122,7 @@ pub(crate) fn append_changes(
     near: &mut Near,
     held: &PointStore,
     mut goals: [Option<Goal<'_>>; PLANES],
-    lights: Option<&[u8]>,
+    lights: Option<&LightVisibility>,
     fits: &mut [Fit; PLANES],
     scratch: &mut Scratch,
 ) -> (Vec<u8>, Changes) {
@@ -134,7 +146,7 @@ pub(crate) fn append_changes(
         fits[k].learn(goal);
     }
     let lights = lights.zip(held.lights()).and_then(|(wanted, lights)| {
-        code_light_changes(&mut writer, (held.layout(), near), lights.values(), Some(wanted))
+        code_light_changes(&mut writer, (held.layout(), near), lights, Some(wanted))
     });
     (writer.finish(), Changes::new(changes, lights.unwrap_or_default(), held))
 }

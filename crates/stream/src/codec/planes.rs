@@ -1,7 +1,7 @@
 //! The bytes of a point, each kind in a plane of its own: visibility, and the two of a bent normal if there are any. What is held of lights
 //! comes after them.
 
-use dapple_store::light_visibility::LightChange;
+use dapple_store::light_visibility::{LightChange, LightVisibility};
 use dapple_store::points::{BentChange, BentNormal, PointStore};
 
 use super::values::ValueChange;
@@ -15,6 +15,9 @@ pub(super) const HAS_BENT: u8 = 0x80;
 /// In the same byte: how many lights there are values of comes after it.
 pub(super) const HAS_LIGHTS: u8 = 0x40;
 
+/// In the same byte, only beside that: with where on each light lies what is seen of it.
+pub(super) const HAS_LEANS: u8 = 0x20;
+
 /// In the byte that says which planes of a delta change: so do values of lights.
 pub(super) const LIGHTS_CHANGE: u8 = 1 << PLANES;
 
@@ -25,11 +28,14 @@ pub(crate) struct Extras {
     pub(crate) has_bent: bool,
     /// Values of so many lights.
     pub(crate) lights: u32,
+    /// And where what is seen of them lies.
+    pub(crate) has_leans: bool,
 }
 
 impl Extras {
     pub(crate) fn of(store: &PointStore) -> Extras {
-        Extras { has_bent: store.bent().is_some(), lights: store.light_count() }
+        let has_leans = store.lights().is_some_and(LightVisibility::has_leans);
+        Extras { has_bent: store.bent().is_some(), lights: store.light_count(), has_leans }
     }
 
     /// Whether a delta says which planes change.

@@ -10,7 +10,6 @@ use dapple_store::points::{MAX_POINTS, PointStore};
 use super::decode::{DecodedLayout, DeltaParts, decode_layout, decode_values};
 #[cfg(feature = "publish")]
 use super::encode::{append_values, encode_layout};
-#[cfg(feature = "publish")]
 use super::planes::Extras;
 use super::values::Near;
 #[cfg(feature = "publish")]
@@ -137,6 +136,9 @@ fn check_fit(
     }
     if decoded.extras.lights != store.light_count() {
         return bad("have values of more or fewer lights than others have");
+    }
+    if decoded.extras.has_leans != Extras::of(store).has_leans {
+        return bad("say where what is seen of lights lies where others do not, or do not where others do");
     }
     if added.sets().is_empty() {
         return bad("are none");

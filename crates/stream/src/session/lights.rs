@@ -1,5 +1,6 @@
 //! Which values of lights a delta brings, and how many fit.
 
+use dapple_store::light_visibility::{LightVisibility, OPEN};
 use dapple_store::points::PointStore;
 
 use crate::codec::Near;
@@ -10,22 +11,36 @@ use crate::light_visibility::code_light_changes;
 const COARSEST: u32 = 16;
 
 /// What subscribers are to hold of `store`: what is off by more than `times` its tolerance (index and steps, ascending; 0 of those that are not
-/// listed, but where `times` is above 1, one step of all) as it is there, the rest as it is `held`. `None` where all of it is near enough.
+/// listed, but where `times` is above 1, one step of all), and with `turns` what leans farther off than a step, as it is there, the rest as it is `held`.
+/// `None` where all of it is near enough.
 pub(super) fn light_changes(
     held: &PointStore,
     store: &PointStore,
     tolerances: &[(u32, u8)],
-    times: u32,
-) -> Option<Vec<u8>> {
-    let (held, new) = (held.lights()?.values(), store.lights()?.values());
-    let mut wanted: Option<Vec<u8>> = None;
+    (times, turns): (u32, bool),
+) -> Option<LightVisibility> {
+    let (held, new) = (held.lights()?, store.lights()?);
+    let turns = turns && new.has_leans();
+    let mut wanted: Option<LightVisibility> = None;
     let mut tolerances = tolerances.iter().peekable();
-    for (index, (old, new)) in held.iter().zip(new).enumerate().filter(|(_, (old, new))| old != new) {
+    for (index, (old, value)) in held.values().iter().zip(new.values()).enumerate() {
+        if old == value && !(turns && held.lean(index) != new.lean(index)) {
+            continue;
+        }
+        let (old_lean, lean) = (held.lean(index), new.lean(index));
         while tolerances.next_if(|(listed, _)| (*listed as usize) < index).is_some() {}
         let tolerance = tolerances.peek().filter(|(listed, _)| *listed as usize == index);
-        let steps = tolerance.map_or(0, |(_, steps)| u32::from(*steps)).max(u32::from(times > 1));
-        if u32::from(old.abs_diff(*new)) > times * steps {
-            wanted.get_or_insert_with(|| held.to_vec())[index] = *new;
+        let tolerance = tolerance.map_or(0, |(_, steps)| u32::from(*steps));
+        let steps = tolerance.max(u32::from(times > 1));
+        // What is not half seen there, or hardly shines, need not lean.
+        let leans = |value: u8| value > 0 && value < OPEN;
+        let is_turned = turns
+            && leans(*old)
+            && leans(*value)
+            && tolerance < u32::from(OPEN)
+            && lean.is_far_from(old_lean);
+        if u32::from(old.abs_diff(*value)) > times * steps || is_turned {
+            wanted.get_or_insert_with(|| held.clone()).set(index, *value, lean);
         }
     }
     wanted
@@ -39,33 +54,39 @@ pub(super) fn lights_within(
     near: &mut Near,
     tolerances: &[(u32, u8)],
     (most_bytes, next): (usize, &mut usize),
-) -> Option<Vec<u8>> {
-    let values = held.lights()?.values();
-    let mut bytes_of = |wanted: &[u8]| {
+) -> Option<LightVisibility> {
+    let before = held.lights()?;
+    let mut bytes_of = |wanted: &LightVisibility| {
         let mut coder = Writer::new(Vec::new());
-        let coded = code_light_changes(&mut coder, (held.layout(), &mut *near), values, Some(wanted));
+        let coded = code_light_changes(&mut coder, (held.layout(), &mut *near), before, Some(wanted));
         debug_assert!(coded.is_some(), "only reading fails");
         coder.finish().len()
     };
-    let mut wanted = light_changes(held, store, tolerances, 1)?;
+    let mut wanted = light_changes(held, store, tolerances, (1, true))?;
     let mut bytes = bytes_of(&wanted);
+    // How much is seen is worth more than where.
+    if bytes > most_bytes
+        && let Some(fewer) = light_changes(held, store, tolerances, (1, false))
+    {
+        (bytes, wanted) = (bytes_of(&fewer), fewer);
+    }
     let mut times = 1;
     while bytes > most_bytes && times < COARSEST {
         times *= 2;
         // Where nothing is that far off, there still is something to say.
-        let Some(fewer) = light_changes(held, store, tolerances, times) else { break };
+        let Some(fewer) = light_changes(held, store, tolerances, (times, false)) else { break };
         bytes = bytes_of(&fewer);
         wanted = fewer;
     }
     // Fewer each time, and by no less than an eighth, so that this ends.
-    let mut changed = changed_values(values, &wanted);
+    let mut changed = changed_values(before, &wanted);
     let turn = changed.partition_point(|index| index < next);
     changed.rotate_left(turn);
     while bytes > most_bytes {
         let share = (most_bytes as f64 / bytes as f64).min(0.97) * 0.9;
         let kept = (changed.len() as f64 * share) as usize;
         for index in changed.drain(kept..) {
-            wanted[index] = values[index];
+            wanted.set(index, before.values()[index], before.lean(index));
         }
         let last = changed.last()?;
         *next = last + 1;
@@ -74,6 +95,9 @@ pub(super) fn lights_within(
     Some(wanted)
 }
 
-fn changed_values(held: &[u8], wanted: &[u8]) -> Vec<usize> {
-    (0..held.len()).filter(|&index| held[index] != wanted[index]).collect()
+fn changed_values(held: &LightVisibility, wanted: &LightVisibility) -> Vec<usize> {
+    let differs = |index: &usize| {
+        held.values()[*index] != wanted.values()[*index] || held.lean(*index) != wanted.lean(*index)
+    };
+    (0..held.values().len()).filter(differs).collect()
 }

@@ -3,6 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use dapple_store::charts::Cuts;
+use dapple_store::light_visibility::LightVisibility;
 use dapple_store::points::{PointLayout, PointStore, SetsChange};
 
 use super::lights::{light_changes, lights_within};
@@ -274,8 +275,8 @@ impl State {
         let precision = precisions[0];
         let Some(most_bytes) = spending.most_bytes else {
             self.pressure = Pressure::default();
-            let lights = light_changes(&self.store, store, spending.light_tolerances, 1);
-            return self.encode(epoch, store, exact, lights.as_deref());
+            let lights = light_changes(&self.store, store, spending.light_tolerances, (1, true));
+            return self.encode(epoch, store, exact, lights.as_ref());
         };
         let most = most_bytes.saturating_sub(ENVELOPE_BYTES);
         let lights = lights_within(
@@ -285,7 +286,7 @@ impl State {
             spending.light_tolerances,
             (most / 2, &mut self.next_light),
         );
-        let lights = lights.as_deref();
+        let lights = lights.as_ref();
         let mut best: Option<Delta> = None;
         let mut search = Search::new(self.pressure, precision, spending.coarseness);
         loop {
@@ -331,7 +332,7 @@ impl State {
         epoch: u64,
         store: &PointStore,
         goals: [(Tolerances<'_>, u8); PLANES],
-        lights: Option<&[u8]>,
+        lights: Option<&LightVisibility>,
     ) -> Option<Delta> {
         let goals = goals_of(&self.store, store, goals);
         if goals.is_none() && lights.is_none() {
@@ -383,12 +384,12 @@ impl State {
             let exact = precisions.map(|Precision { tolerance, step }| (Tolerances::Even(tolerance), step));
             goals_of(&self.store, store, exact)
         });
-        let lights = exact.and_then(|(_, tolerances)| light_changes(&self.store, store, tolerances, 1));
+        let lights =
+            exact.and_then(|(_, tolerances)| light_changes(&self.store, store, tolerances, (1, true)));
         if goals.is_some() || lights.is_some() {
             let goals = goals.unwrap_or_default();
             let State { near, store: held, fits, scratch, .. } = self;
-            let (bytes, changes) =
-                append_changes(payload, near, held, goals, lights.as_deref(), fits, scratch);
+            let (bytes, changes) = append_changes(payload, near, held, goals, lights.as_ref(), fits, scratch);
             apply(held, &changes).expect("changes are of points of the store");
             (payload, changed) = (bytes, changed + changes.visibility.len());
         }

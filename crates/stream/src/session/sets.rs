@@ -72,9 +72,14 @@ fn light_changes(old: &PointStore, new: &PointStore, added: &[u32]) -> Vec<Light
             let Some(was) = was.filter(|_| added.binary_search(&set.instance).is_err()) else { continue };
             let values = &before.of_light(light)[was.first as usize..][..was.len()];
             let new = &now.of_light(light)[set.first as usize..][..set.len()];
-            let indices = first as u32 + set.first..;
-            let pairs = indices.zip(values.iter().zip(new)).filter(|(_, (old, new))| old != new);
-            changes.extend(pairs.map(|(index, (&old, &new))| LightChange { index, old, new }));
+            let places =
+                (first + set.first as usize..).zip(light as usize * before.points() + was.first as usize..);
+            for ((at, was_at), (&old, &new)) in places.zip(values.iter().zip(new)) {
+                let (old_lean, new_lean) = (before.lean(was_at), now.lean(at));
+                if old != new || old_lean != new_lean {
+                    changes.push(LightChange { index: at as u32, old, new, old_lean, new_lean });
+                }
+            }
         }
     }
     changes

@@ -13,7 +13,8 @@ pub struct Spending<'a> {
     /// the eye, an error shows on a quarter of the pixels, so that bits are spent best in proportion to the distance.
     /// Empty, or of another length: 1 everywhere (default).
     pub coarseness: &'a [f32],
-    /// By how many steps values of lights may be off before one sees it: index and steps, ascending; those that are not listed, by none (default).
+    /// By how many steps values of lights may be off before one sees it: index and steps, ascending; those that are not listed, by none (default). Where it lies
+    /// what is seen of them ([`Lean`](dapple_store::light_visibility::Lean)) may be a step off, or more where as many steps as there are would not be seen.
     /// Under a limit this is raised as far as it takes (that of those not listed is 1 then), and lights get at most half of the bytes.
     pub light_tolerances: &'a [(u32, u8)],
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use dapple_store::light_visibility::{LightVisibility, OPEN};
+use dapple_store::light_visibility::{LEAN_STEPS, Lean, LightVisibility, OPEN};
 use dapple_store::points::{MAX_COORDINATE, PointLayout, PointStore};
 use proptest::prelude::*;
 
@@ -46,15 +46,22 @@ prop_compose! {
 pub(crate) fn stores() -> impl Strategy<Value = PointStore> {
     (layouts(), 0u32..4).prop_flat_map(|(layout, lights)| {
         let plane = || prop::collection::vec(any::<u8>(), layout.len());
-        let of_lights = prop::collection::vec(0..=OPEN, layout.len() * lights as usize);
-        (plane(), prop::option::of([plane(), plane()]), of_lights).prop_map(
-            move |(values, bent, of_lights)| {
+        let count = layout.len() * lights as usize;
+        let of_lights = prop::collection::vec(0..=OPEN, count);
+        let leans = prop::option::of(prop::collection::vec([-LEAN_STEPS..=LEAN_STEPS, -1..=1], count));
+        (plane(), prop::option::of([plane(), plane()]), of_lights, leans).prop_map(
+            move |(values, bent, of_lights, leans)| {
                 let mut store = PointStore::new(layout.clone(), values).expect("one value a point");
                 if let Some(bent) = bent {
                     store = store.with_bent(bent).expect("one a point");
                 }
                 if lights > 0 {
-                    let lights = LightVisibility::new(&layout, lights, of_lights).expect("a few lights");
+                    let of = leans.into_iter().flatten().zip(&of_lights);
+                    let leans: Vec<Lean> = of.map(|(lean, value)| Lean(lean).of_value(*value)).collect();
+                    let mut lights = LightVisibility::new(&layout, lights, of_lights).expect("a few lights");
+                    if !leans.is_empty() {
+                        lights = lights.with_leans(leans).expect("one a value");
+                    }
                     store = store.with_lights(lights).expect("one a point and light");
                 }
                 store

@@ -195,7 +195,8 @@ fn names(results: &Results) -> Vec<String> {
 
 /// Writes a picture of its own for every name in the results.
 fn write_pictures(folder: &Path, results: &Results) {
-    let of_studies = results.studies.iter().flat_map(|study| &study.pictures).map(|picture| picture.file.clone());
+    let of_studies =
+        results.studies.iter().flat_map(|study| &study.pictures).map(|picture| picture.file.clone());
     for (i, name) in names(results).into_iter().chain(of_studies).enumerate() {
         let picture = RgbImage::from_fn(WIDTH, HEIGHT, |x, y| {
             let hash = (x * 7919 + y * 104_729 + i as u32 * 1_299_709).wrapping_mul(2_654_435_761);

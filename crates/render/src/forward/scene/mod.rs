@@ -287,7 +287,9 @@ impl GpuScene {
     }
 
     /// Writes how much of each light is seen, in an atlas of the same size as that of visibility: four lights a group, in the order of
-    /// [`AreaLightTable::lights`], of each group all layers. While there are fewer groups than the table has lights all lights are open.
+    /// [`AreaLightTable::lights`], of each group all layers; with leans three planes a group
+    /// ([`VisibilityAtlas::light_texels`](crate::psao::atlas::VisibilityAtlas::light_texels)). While there are fewer groups than the table has lights all
+    /// lights are open.
     ///
     /// # Errors
     /// As [`AtlasTexture::upload`], for the layers of all groups together; groups that differ in length.
@@ -295,10 +297,11 @@ impl GpuScene {
         &mut self,
         gpu: &Gpu,
         side: u32,
-        groups: &[&[[u8; LIGHTS_A_TEXEL]]],
+        planes: &[&[[u8; LIGHTS_A_TEXEL]]],
+        has_leans: bool,
         bands: &[AtlasBand],
     ) -> Result<(), ForwardError> {
-        if self.area_lights.upload(gpu, side, groups, bands)? {
+        if self.area_lights.upload(gpu, side, planes, has_leans, bands)? {
             self.regroup(gpu);
         }
         Ok(())

@@ -2,7 +2,7 @@
 
 use dapple_scene::area_lights::{AreaLights, EmitterShape};
 use dapple_scene::{Material, PosedCamera};
-use dapple_store::light_visibility::{LightChange, LightVisibility, OPEN};
+use dapple_store::light_visibility::{LEAN_STEPS, Lean, LightChange, LightVisibility, OPEN, SeenLight};
 use glam::{Affine3A, Vec3};
 
 use super::super::{AtlasBand, LookupId, View};
@@ -96,7 +96,7 @@ fn lit_twin(stage: &Stage, params: &ShadeParams, atlas: Option<&VisibilityAtlas>
     let table = table(stage);
     let reflected = shade_area_lights(&points, &table, |sample, row| match atlas {
         Some(atlas) => atlas.look_up_lights(&gbuffer.samples()[sample], table.lights(), row),
-        None => row.fill(1.0),
+        None => row.fill(SeenLight::ALL),
     });
     shaded.direct.iter_mut().zip(reflected).for_each(|(direct, reflected)| *direct += reflected);
     (compose(&shaded, &gbuffer, None).unwrap().to_rgb8(&ToneMap::default()), gbuffer)
@@ -124,7 +124,7 @@ fn every_form_of_light_is_lit_like_the_twin_and_none_changes_nothing() {
 }
 
 /// An atlas of points so far apart that sees waves of each light, and a bench that has it on its card.
-fn dimmed(stage: &Stage, spacing: f32) -> Option<(VisibilityAtlas, LightVisibility, Bench)> {
+fn dimmed(stage: &Stage, spacing: f32, has_leans: bool) -> Option<(VisibilityAtlas, LightVisibility, Bench)> {
     let layout = lay(&stage.scene, spacing);
     let values = vec![255; layout.len()];
     let mut atlas = VisibilityAtlas::new(layout.clone(), &stage.scene, None, AtlasParams::default());
@@ -143,7 +143,8 @@ fn dimmed(stage: &Stage, spacing: f32) -> Option<(VisibilityAtlas, LightVisibili
         }
     }
     let held = LightVisibility::new(&layout, lights, planes).unwrap();
-    atlas.resolve_lights(&held);
+    let held = if has_leans { leaning(held) } else { held };
+    atlas.resolve_lights(&held).unwrap();
     let mut bench = Bench::new(&stage.scene, 1, &[])?;
     for instance in atlas.take_ready() {
         bench.scene.set_charts(&bench.gpu, instance, atlas.charts(instance).unwrap()).unwrap();
@@ -162,14 +163,14 @@ fn upload(bench: &mut Bench, atlas: &mut VisibilityAtlas) {
     let dirty = atlas.take_dirty_lights();
     let bands = dirty.iter().map(|b| AtlasBand { layer: b.layer, first_row: b.y.start, end_row: b.y.end });
     let bands: Vec<AtlasBand> = bands.collect();
-    let groups: Vec<_> = atlas.light_texels().iter().map(Vec::as_slice).collect();
-    bench.scene.upload_lights(&bench.gpu, atlas.side(), &groups, &bands).unwrap();
+    let planes: Vec<_> = atlas.light_texels().iter().map(Vec::as_slice).collect();
+    bench.scene.upload_lights(&bench.gpu, atlas.side(), &planes, atlas.shows_leans(), &bands).unwrap();
 }
 
 #[test]
 fn lights_are_dimmed_by_what_points_see_of_them() {
     let stage = stage();
-    let Some((mut atlas, held, mut bench)) = dimmed(&stage, 0.12) else { return };
+    let Some((mut atlas, held, mut bench)) = dimmed(&stage, 0.12, false) else { return };
     let open = lit_twin(&stage, &dim(), None).0;
     let (twin, gbuffer) = lit_twin(&stage, &dim(), Some(&atlas));
     assert_agrees("area-dimmed", &draw(&mut bench, &stage, &dim(), LookupId::ATLAS), &twin, &gbuffer);
@@ -179,7 +180,12 @@ fn lights_are_dimmed_by_what_points_see_of_them() {
     let changes: Vec<LightChange> = (0u32..)
         .zip(held.values())
         .filter(|(index, _)| index % points > points / 2)
-        .map(|(index, old)| LightChange { index, old: *old, new: 0 })
+        .map(|(index, old)| LightChange {
+            index,
+            old: *old,
+            old_lean: held.lean(index as usize),
+            ..LightChange::default()
+        })
         .collect();
     atlas.apply_lights(&changes);
     upload(&mut bench, &mut atlas);
@@ -189,6 +195,45 @@ fn lights_are_dimmed_by_what_points_see_of_them() {
     assert_ne!(changed, twin);
 }
 
+/// The same, and what is half seen lies on another side with every few points.
+fn leaning(held: LightVisibility) -> LightVisibility {
+    let side = |step: usize| (step % (2 * LEAN_STEPS as usize + 1)) as i8 - LEAN_STEPS;
+    let lean = |(i, value): (usize, &u8)| Lean([side(i / 40), side(i / 17)]).of_value(*value);
+    let leans = held.values().iter().enumerate().map(lean).collect();
+    held.with_leans(leans).unwrap()
+}
+
+#[test]
+fn highlights_lean_to_what_is_seen_of_a_light() {
+    let mut stage = stage();
+    for material in &mut stage.scene.materials {
+        material.roughness_factor = 0.3;
+    }
+    let Some((mut atlas, held, mut bench)) = dimmed(&stage, 0.12, true) else { return };
+    assert!(atlas.shows_leans());
+    let (twin, gbuffer) = lit_twin(&stage, &dim(), Some(&atlas));
+    assert_agrees("area-leaning", &draw(&mut bench, &stage, &dim(), LookupId::ATLAS), &twin, &gbuffer);
+    // The same shares in the middle of each light: written over the others, and another picture.
+    let changes: Vec<LightChange> = (0..held.values().len())
+        .map(|index| (index, held.values()[index], held.lean(index)))
+        .filter(|(_, _, lean)| *lean != Lean::NONE)
+        .map(|(index, old, old_lean)| LightChange {
+            index: index as u32,
+            old,
+            new: old,
+            old_lean,
+            new_lean: Lean::NONE,
+        })
+        .collect();
+    assert!(changes.len() > 500);
+    atlas.apply_lights(&changes);
+    upload(&mut bench, &mut atlas);
+    let (middle, gbuffer) = lit_twin(&stage, &dim(), Some(&atlas));
+    assert_agrees("area-middle", &draw(&mut bench, &stage, &dim(), LookupId::ATLAS), &middle, &gbuffer);
+    let differ = middle.pixels.iter().zip(&twin.pixels).filter(|(a, b)| a != b).count();
+    assert!(differ > middle.pixels.len() / 50, "{differ}");
+}
+
 #[test]
 fn triangles_smaller_than_texels_read_one_of_their_vertices() {
     let mut stage = stage();
@@ -196,7 +241,7 @@ fn triangles_smaller_than_texels_read_one_of_their_vertices() {
     for (i, position) in stage.scene.meshes[1].positions.iter_mut().enumerate() {
         *position *= 1.0 + 0.1 * (i * i * 7 % 11 % 3) as f32;
     }
-    let Some((atlas, _, mut bench)) = dimmed(&stage, 0.4) else { return };
+    let Some((atlas, _, mut bench)) = dimmed(&stage, 0.4, false) else { return };
     let is_fine = |instance: u32| atlas.charts(instance).is_some_and(|charts| charts.is_per_vertex());
     assert!(is_fine(1), "the ball has texels at its vertices");
     let (twin, gbuffer) = lit_twin(&stage, &dim(), Some(&atlas));

@@ -24,7 +24,7 @@ struct Frame {
     point_half: vec2<f32>,
     // Metres that half a point spans: at distance 1 (perspective) or anywhere (parallel).
     point_half_m: f32,
-    // Area lights in the lower half; layers of a group of four of them in the upper one, or 0: all are open.
+    // Area lights in the lowest byte, 256 more if the atlas has leans; layers of a plane of four of them in the upper half, or 0: all are open.
     area_lights: u32,
 }
 

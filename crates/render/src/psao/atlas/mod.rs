@@ -23,7 +23,7 @@ use dapple_store::charts::{AtlasError, ChartError, ChartSet, Cuts, InstanceKey, 
 use dapple_store::points::PointLayout;
 
 pub use dapple_store::charts::Placement;
-pub use light_texels::LIGHTS_A_TEXEL;
+pub use light_texels::{LIGHTS_A_TEXEL, PLANES_WITH_LEANS};
 pub use pages::{DirtyBand, MAX_LAYERS};
 pub use upload::TexelInfo;
 
@@ -46,11 +46,19 @@ pub struct AtlasParams {
     /// outside: this bounds the memory that it can ask for, some 10 bytes a texel and 60 more while an instance is made.
     /// Default `None`: 16 a point, and 2²⁰ more; 4 a point are common.
     pub max_texels: Option<u64>,
+    /// Most bytes of sums of how much is seen of lights, for all instances together ([`VisibilityAtlas::resolve_lights`]), default 256 MiB: how many lights
+    /// there are comes from outside, too.
+    pub max_light_bytes: u64,
 }
 
 impl Default for AtlasParams {
     fn default() -> Self {
-        AtlasParams { weights: WeightParams::default(), texel_factor: 1.0, max_texels: None }
+        AtlasParams {
+            weights: WeightParams::default(),
+            texel_factor: 1.0,
+            max_texels: None,
+            max_light_bytes: 256 << 20,
+        }
     }
 }
 
@@ -107,11 +115,23 @@ pub struct VisibilityAtlas {
     failed: Vec<(u32, BuildError)>,
     /// Of lights that are shown on a card.
     light_texels: Option<LightTexels>,
+    /// Whether values of lights come with leans.
+    has_leans: bool,
 }
 
-/// Why an instance cannot be shown with its visibility.
+/// Why an instance cannot be shown with its visibility, or lights with theirs.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BuildError {
+    /// Lights of more texels than fit.
+    #[error("what is seen of {lights} lights takes {} MB, more than {} MB", needed / 1_000_000, limit / 1_000_000)]
+    TooManyLights {
+        /// Lights.
+        lights: u32,
+        /// Bytes that it would take.
+        needed: u64,
+        /// [`AtlasParams::max_light_bytes`].
+        limit: u64,
+    },
     /// Its mesh cannot be cut into charts.
     #[error(transparent)]
     Charts(#[from] ChartError),
@@ -180,6 +200,7 @@ impl VisibilityAtlas {
             fading: Vec::new(),
             failed: Vec::new(),
             light_texels: None,
+            has_leans: false,
             layout,
         };
         atlas.queue_open(scene);

@@ -16,5 +16,6 @@ pub(crate) use delta::{Guide, MOST_FOLLOW, Scale, Scratch, code_changes};
 #[cfg(feature = "publish")]
 pub(crate) use goal::{Fit, Goal, Tolerances};
 pub(crate) use near::{BLOCK, Back, Near, SHARES};
+pub(crate) use nearest::Candidates;
 pub(crate) use snapshot::code_values;
 pub use start::first_chances;

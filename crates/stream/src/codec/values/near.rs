@@ -58,6 +58,11 @@ impl Near {
         &self.blocks
     }
 
+    /// The neighbours of a block's points, found anew.
+    pub(crate) fn neighbours(&self, layout: &PointLayout, block: usize, candidates: &mut Candidates) -> Back {
+        self.blocks.find(layout, block, candidates)
+    }
+
     /// The neighbours of a block's points, kept for the next time.
     pub(crate) fn of_block(&mut self, layout: &PointLayout, block: usize) -> &Back {
         if self.slots[block] == 0 {

@@ -44,7 +44,7 @@ pub(super) fn touches(a: &Bounds, b: &Bounds) -> bool {
 
 /// What may be near the points of a part of a block, the last first. Kept to be used again.
 #[derive(Clone, Debug)]
-pub(super) struct Candidates {
+pub(crate) struct Candidates {
     chunks: Vec<Chunk>,
     /// By index within their set, before they are put into chunks; the first `count` count.
     kept: Box<[u32; BLOCKS_SEARCHED * BLOCK]>,

@@ -68,7 +68,7 @@ impl Rig {
 
     fn trace(&self, pose: &Pose, params: &VisibilityParams) -> (LightVisibility, VisibilityCounts) {
         let (tracer, lights) = (Tracer::new(&self.scene, pose), AreaLights::new(&self.scene, pose));
-        trace_visibility(&self.layout, &self.sites, &tracer, &lights, params).unwrap()
+        trace_visibility(&self.layout, (&self.sites, None), &tracer, &lights, params).unwrap()
     }
 
     fn tracker(&self, tolerance: f32, visibility: VisibilityParams) -> LightTracker {
@@ -241,4 +241,43 @@ fn the_number_of_threads_does_not_matter() {
         pool.install(|| rig.trace(&rig.pose, &VisibilityParams::default()))
     };
     assert_eq!(run(1), run(5));
+}
+
+#[test]
+fn what_is_half_seen_leans_to_the_side_that_is_seen() {
+    // As above: under the shutter's edge along z a point sees the half of the panel that is on its own side.
+    let panel = (flat(1.0, 0.0), EmitterShape::Rectangle, 5.0, shifted(0.0, 2.0));
+    let mut rig = Rig::new(shifted(-1.0, 1.0), vec![panel]);
+    let params = VisibilityParams { rays: 256, first: 256, seed: 3 };
+    assert!(!rig.tracker(0.1, params).values().has_leans(), "nothing is glossy");
+    rig.scene.materials[0].roughness_factor = 0.2;
+    let mut tracker = rig.tracker(0.1, params);
+    let tracked = tracker.values();
+    assert_eq!(tracked.values(), rig.trace(&rig.pose, &params).0.values());
+    let mut half = 0;
+    for (index, value) in tracked.values().iter().enumerate() {
+        let (Lean([across, along]), site) = (tracked.lean(index), rig.sites[index].as_ref().unwrap());
+        if site.position_world.length() < 1.0 && (8..24).contains(value) {
+            // Towards +x, about 0.4 of the radius where half is seen: 1 to 3 of 4 steps; the edge runs along z.
+            assert!(
+                (1..=3).contains(&across) && along.abs() <= 1,
+                "{across}, {along} at {}",
+                site.position_world
+            );
+            half += 1;
+        }
+        assert!((*value > 0 && *value < OPEN) || tracked.lean(index) == Lean::NONE);
+    }
+    assert!(half >= 6, "{half}");
+    // A shutter from the other side: as much is seen, and leans the other way.
+    rig.step(&mut tracker, &rig.moved(1, shifted(1.0, 1.0)));
+    let opposite = |x: f32| {
+        let at = (0..400).min_by(|a, b| {
+            let off =
+                |i: &usize| rig.sites[*i].as_ref().unwrap().position_world.distance(Vec3::new(x, 0.0, 0.2));
+            off(a).total_cmp(&off(b))
+        });
+        tracker.values().lean(at.unwrap())
+    };
+    assert!(opposite(0.2).0[0] <= -1 && opposite(-0.2).0[0] <= -1);
 }

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use dapple_scene::area_lights::AreaLights;
-use dapple_scene::{Pose, Scene};
-use dapple_store::light_visibility::{LightVisibility, LightVisibilityError, OPEN};
+use dapple_scene::glam::Vec3;
+use dapple_scene::{Material, Part, Pose, Reflectance, Scene};
+use dapple_store::light_visibility::{Lean, LightVisibility, LightVisibilityError, OPEN};
 use dapple_store::points::{PointLayout, PointStore};
 use rayon::prelude::*;
 
@@ -38,6 +39,8 @@ pub struct LightTracker {
     layout: Arc<PointLayout>,
     /// Of the points, at the moment of the last step.
     sites: Vec<Option<Site>>,
+    /// Which points lie on something glossy; `None` where nothing of the scene is.
+    glossy: Option<Vec<bool>>,
     values: LightVisibility,
     /// Which values are to be found again, one each.
     is_due: Vec<bool>,
@@ -67,12 +70,15 @@ impl LightTracker {
     ) -> Result<LightTracker, LightVisibilityError> {
         let sites = sites_world(layout, anchors, scene, pose);
         let lights = AreaLights::new(scene, pose);
-        let (values, first) = trace_visibility(layout, &sites, tracer, &lights, &params.visibility)?;
+        let glossy = glossy(scene, layout, anchors);
+        let (values, first) =
+            trace_visibility(layout, (&sites, glossy.as_deref()), tracer, &lights, &params.visibility)?;
         let is_due = vec![false; values.values().len()];
         let mut tracker = LightTracker {
             params,
             layout: layout.clone(),
             sites,
+            glossy,
             values,
             is_due,
             due: 0,
@@ -113,7 +119,8 @@ impl LightTracker {
     pub fn bytes(&self) -> usize {
         self.sites.capacity() * size_of::<Option<Site>>()
             + self.is_due.capacity()
-            + self.values.values().len()
+            + self.glossy.as_ref().map_or(0, Vec::capacity)
+            + self.values.bytes()
     }
 
     /// All values as all rays would find them now, at the pose of the last step: [`LightTracker::values`] where nothing is due.
@@ -126,7 +133,13 @@ impl LightTracker {
         let lights = AreaLights::new(scene, pose);
         let mut values = self.values.clone();
         let params = &self.params.visibility;
-        let (_, counts) = super::retrace_visibility(&mut values, &self.sites, tracer, &lights, params);
+        let (_, counts) = super::retrace_visibility(
+            &mut values,
+            (&self.sites, self.glossy.as_deref()),
+            tracer,
+            &lights,
+            params,
+        );
         (values, counts)
     }
 
@@ -147,6 +160,12 @@ impl LightTracker {
         let lights = AreaLights::new(scene, pose);
         // Refuses what is too much.
         let open = LightVisibility::open(layout, self.values.lights())?;
+        let open = if self.values.has_leans() {
+            let none = vec![Lean::NONE; open.values().len()];
+            open.with_leans(none)?
+        } else {
+            open
+        };
         let store = |layout: &Arc<PointLayout>, values| {
             PointStore::new(layout.clone(), vec![0; layout.len()]).and_then(|store| store.with_lights(values))
         };
@@ -175,6 +194,7 @@ impl LightTracker {
             }
         }
         (self.sites, self.values) = (sites_world(layout, anchors, scene, pose), values);
+        self.glossy = glossy(scene, layout, anchors);
         (self.layout, self.is_due, self.next) = (layout.clone(), is_due, 0);
         self.due = self.is_due.iter().filter(|due| **due).count();
         let mut counts = VisibilityCounts::default();
@@ -262,9 +282,9 @@ impl LightTracker {
         for (index, value, rays) in self.find(list, tracer, lights) {
             (self.is_due[index], self.due) = (false, self.due - 1);
             counts.rays += rays;
-            let Some(new) = value else { continue };
+            let Some((new, lean)) = value else { continue };
             counts.traced += 1;
-            counts.changed += u64::from(self.values.set(index, new));
+            counts.changed += u64::from(self.values.set(index, new, lean));
         }
     }
 
@@ -274,7 +294,7 @@ impl LightTracker {
         list: &[usize],
         tracer: &Tracer,
         lights: &AreaLights<'_>,
-    ) -> Vec<(usize, Option<u8>, u64)> {
+    ) -> Vec<(usize, Option<(u8, Lean)>, u64)> {
         let points = self.layout.len();
         let chunk = |list: &[usize]| {
             let mut worker = Worker::default();
@@ -282,8 +302,10 @@ impl LightTracker {
                 let (light, mut rays) = (index / points, 0);
                 let site = self.sites[index % points].as_ref().filter(|site| is_usable(site));
                 let site = site.filter(|s| lights.arriving(light, s.position_world, s.normal_world) > 0.0);
+                let wants_lean = self.glossy.as_ref().is_some_and(|glossy| glossy[index % points]);
+                let params = &self.params.visibility;
                 let value = site.and_then(|site| {
-                    worker.value(tracer, (light, lights), site, &self.params.visibility, &mut rays)
+                    worker.value(tracer, (light, lights), (site, wants_lean), params, &mut rays)
                 });
                 (index, value, rays)
             };
@@ -292,14 +314,16 @@ impl LightTracker {
         list.par_chunks(CHUNK).flat_map_iter(chunk).collect()
     }
 
-    /// By how many steps values may be off, of those that differ from what is `held` elsewhere of the same points: index and steps, ascending.
+    /// By how many steps values may be off, of those that differ from what is `held` elsewhere of the same points, or lean elsewhere: index and steps, ascending.
     /// `pose` is that of the last step.
     pub fn tolerances(&self, held: &LightVisibility, scene: &Scene, pose: &Pose) -> Vec<(u32, u8)> {
         let lights = AreaLights::new(scene, pose);
-        let pairs = held.values().par_iter().zip(self.values.values()).enumerate();
-        let differ = pairs.filter(|(_, (held, new))| held != new);
-        let steps = |(index, _): (usize, _)| (index as u32, self.tolerance(index, &lights));
-        differ.map(steps).collect()
+        let values = &self.values;
+        let all = (0..held.values().len().min(values.values().len())).into_par_iter();
+        let differ = all.filter(|&index| {
+            held.values()[index] != values.values()[index] || held.lean(index).is_far_from(values.lean(index))
+        });
+        differ.map(|index| (index as u32, self.tolerance(index, &lights))).collect()
     }
 
     /// By how many steps a value may be off; 255 where its light does not matter.
@@ -322,4 +346,34 @@ impl LightTracker {
         };
         (0..self.values.lights() as usize).map(of).sum()
     }
+}
+
+/// Roughness up to which a surface mirrors enough of a light for one to see which part of it is hidden.
+const GLOSSY_ROUGHNESS: f32 = 0.5;
+
+/// Which points lie on something glossy; `None` if nothing of the scene may be, whichever points there are.
+fn glossy(scene: &Scene, layout: &PointLayout, anchors: &[Anchor]) -> Option<Vec<bool>> {
+    let may_be =
+        |m: &Material| m.roughness_factor <= GLOSSY_ROUGHNESS || m.metallic_roughness_texture.is_some();
+    let mut parts = scene.instances.iter().flat_map(|instance| &scene.meshes[instance.mesh as usize].parts);
+    if !parts.any(|part| may_be(&scene.materials[part.material as usize])) {
+        return None;
+    }
+    let mut found = Vec::with_capacity(layout.len());
+    for set in layout.sets() {
+        let mesh = &scene.meshes[scene.instances[set.instance as usize].mesh as usize];
+        let is_glossy = |anchor: &Anchor| {
+            let triangle = anchor.triangle();
+            let holds = |part: &&Part| {
+                (part.first_triangle..part.first_triangle + part.triangle_count).contains(&triangle)
+            };
+            let Some(part) = mesh.parts.iter().find(holds) else { return false };
+            let uv = [0, 1].map(|set| mesh.uv(set, triangle, anchor.barycentrics()));
+            let material = &scene.materials[part.material as usize];
+            let reflectance = Reflectance::of(scene, material, &uv, Vec3::ONE, true);
+            reflectance.alpha <= GLOSSY_ROUGHNESS * GLOSSY_ROUGHNESS
+        };
+        found.extend(anchors[set.first as usize..][..set.len()].iter().map(is_glossy));
+    }
+    Some(found)
 }
