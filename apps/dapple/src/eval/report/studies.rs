@@ -1,10 +1,12 @@
 //! Studies on the page: their words and tables. Plots are drawn by the page's scripts.
 
 use std::fmt::Write;
+use std::io::Cursor;
 use std::path::Path;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use image::ImageReader;
 
 use super::pictures::{media_type, shrink};
 use super::results::{Results, StudyPicture, StudyTable};
@@ -61,7 +63,12 @@ fn write_picture(html: &mut String, picture: &StudyPicture, folder: &Path, budge
         Some(bytes) => {
             *budget_bytes -= bytes.len();
             let data = STANDARD.encode(&bytes);
-            format!("<img src=\"data:{};base64,{data}\" alt=\"{title}\">", media_type(&bytes))
+            // Their size is known before they are, so that nothing below moves while they are decoded.
+            let size = ImageReader::new(Cursor::new(&bytes)).with_guessed_format().ok();
+            let size = size.and_then(|reader| reader.into_dimensions().ok());
+            let size = size
+                .map_or(String::new(), |(width, height)| format!(" width=\"{width}\" height=\"{height}\""));
+            format!("<img src=\"data:{};base64,{data}\" alt=\"{title}\"{size}>", media_type(&bytes))
         }
         None => format!("<p class=\"empty\">{file}</p>"),
     };

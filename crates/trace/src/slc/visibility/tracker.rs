@@ -348,8 +348,9 @@ impl LightTracker {
     }
 }
 
-/// Roughness up to which a surface mirrors enough of a light for one to see which part of it is hidden.
-const GLOSSY_ROUGHNESS: f32 = 0.5;
+/// Roughness up to which a surface mirrors enough of a light for one to see which part of it is hidden. On rougher ones leans cost bits, and nothing is
+/// seen of them (`README.md`).
+const GLOSSY_ROUGHNESS: f32 = 0.3;
 
 /// Which points lie on something glossy; `None` if nothing of the scene may be, whichever points there are.
 fn glossy(scene: &Scene, layout: &PointLayout, anchors: &[Anchor]) -> Option<Vec<bool>> {
