@@ -153,10 +153,10 @@ impl Light {
         let before = atlas.ready_count();
         let progress = atlas.work(&self.scene, store.visibility(), texels);
         if atlas.ready_count() > before {
-            if let Some(lights) = store.lights().filter(|_| self.lights > 0) {
-                if let Err(error) = atlas.resolve_lights(lights) {
-                    self.lights_problem = Some(lights_problem(error));
-                }
+            if let Some(lights) = store.lights().filter(|_| self.lights > 0)
+                && let Err(error) = atlas.resolve_lights(lights)
+            {
+                self.lights_problem = Some(lights_problem(error));
             }
             // All texels share one fade: it begins anew, for the others from what they show.
             atlas.begin_update(fade_at(self.fade_start_s, now_s, fade_s));

@@ -29,6 +29,9 @@ impl Default for TrackerParams {
     }
 }
 
+/// Index of a value, what it is and where what is seen lies (nothing where the light does not reach the point), and the rays that it took.
+type Traced = (usize, Option<(u8, Lean)>, u64);
+
 /// Irradiance that counts as black, as a share of that of the brightest hundredth of the points at first.
 const BLACK: f32 = 0.02;
 
@@ -289,12 +292,7 @@ impl LightTracker {
     }
 
     /// Values at these indices, with what each took; none where the light does not reach the point.
-    fn find(
-        &self,
-        list: &[usize],
-        tracer: &Tracer,
-        lights: &AreaLights<'_>,
-    ) -> Vec<(usize, Option<(u8, Lean)>, u64)> {
+    fn find(&self, list: &[usize], tracer: &Tracer, lights: &AreaLights<'_>) -> Vec<Traced> {
         let points = self.layout.len();
         let chunk = |list: &[usize]| {
             let mut worker = Worker::default();
