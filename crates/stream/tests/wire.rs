@@ -157,22 +157,34 @@ fn the_bent_vectors_are_those_of_the_encoder_and_decode() {
 /// The same points with two lights: a shadow comes over three of them, of one light.
 #[test]
 fn the_light_vectors_are_those_of_the_encoder_and_decode() {
+    let change = |index, old, new| LightChange { index, old, new, ..LightChange::default() };
+    let changes = [change(1, 31, 25), change(2, 20, 0), change(6, 31, 0)];
+    light_vectors(["lights", "shade"], (2, vec![31, 31, 20, 0, 31, 31, 31, 31], None), &changes);
+}
+
+/// A snapshot of four points with these lights, their values and leans, and the delta to those after the changes: as the documents have them.
+fn light_vectors(
+    names: [&str; 2],
+    (lights, values, leans): (u32, Vec<u8>, Option<Vec<Lean>>),
+    changes: &[LightChange],
+) {
     let points = (0..4).map(|i| ([i, 0, 0], [127, 127])).collect();
     let layout = PointLayout::new(1.0, 1.0, vec![common::set(0, [0.0; 3], points)]).unwrap();
-    let lights = LightVisibility::new(&layout, 2, vec![31, 31, 20, 0, 31, 31, 31, 31]).unwrap();
+    let mut lights = LightVisibility::new(&layout, lights, values).unwrap();
+    if let Some(leans) = leans {
+        lights = lights.with_leans(leans).unwrap();
+    }
     let store = PointStore::new(layout.into(), vec![255, 200, 200, 255]).unwrap();
     let mut store = store.with_lights(lights).unwrap();
     let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
     let mut subscriber = Subscriber::new(None, Limits::default());
     let snapshot = publisher.publish(&store).unwrap();
-    let change = |index, old, new| LightChange { index, old, new, ..LightChange::default() };
-    let changes = [change(1, 31, 25), change(2, 20, 0), change(6, 31, 0)];
-    store.apply_lights(&changes).unwrap();
+    store.apply_lights(changes).unwrap();
     let delta = publisher.publish(&store).unwrap();
-    assert_eq!(hex(&vector("lights")), hex(&snapshot.bytes));
-    assert_eq!(hex(&vector("shade")), hex(&delta.bytes));
-    assert_eq!(subscriber.receive(&vector("lights")), Ok(Applied::NewLayout));
-    assert_eq!(subscriber.receive(&vector("shade")), Ok(Applied::Changes(Vec::new())));
+    let [first, second] = names.map(vector);
+    assert_eq!([hex(&first), hex(&second)], [hex(&snapshot.bytes), hex(&delta.bytes)]);
+    assert_eq!(subscriber.receive(&first), Ok(Applied::NewLayout));
+    assert_eq!(subscriber.receive(&second), Ok(Applied::Changes(Vec::new())));
     assert_eq!(subscriber.light_changes(), changes);
     assert!(common::same_bits(subscriber.store().unwrap(), &store));
 }
@@ -180,15 +192,6 @@ fn the_light_vectors_are_those_of_the_encoder_and_decode() {
 /// The same points with one light that two of them see half of, and where; then one of them sees another half, and the light goes up at a third.
 #[test]
 fn the_lean_vectors_are_those_of_the_encoder_and_decode() {
-    let points = (0..4).map(|i| ([i, 0, 0], [127, 127])).collect();
-    let layout = PointLayout::new(1.0, 1.0, vec![common::set(0, [0.0; 3], points)]).unwrap();
-    let leans = [[0, 0], [2, -1], [3, 0], [0, 0]].map(Lean).to_vec();
-    let lights = LightVisibility::new(&layout, 1, vec![31, 20, 9, 0]).unwrap().with_leans(leans).unwrap();
-    let store = PointStore::new(layout.into(), vec![255, 200, 200, 255]).unwrap();
-    let mut store = store.with_lights(lights).unwrap();
-    let mut publisher = Publisher::new([0; 32], PublisherConfig::default());
-    let mut subscriber = Subscriber::new(None, Limits::default());
-    let snapshot = publisher.publish(&store).unwrap();
     let change = |index, [old, new]: [u8; 2], [old_lean, new_lean]: [[i8; 2]; 2]| LightChange {
         index,
         old,
@@ -197,14 +200,8 @@ fn the_lean_vectors_are_those_of_the_encoder_and_decode() {
         new_lean: Lean(new_lean),
     };
     let changes = [change(2, [9, 9], [[3, 0], [-2, 0]]), change(3, [0, 4], [[0, 0], [4, 0]])];
-    store.apply_lights(&changes).unwrap();
-    let delta = publisher.publish(&store).unwrap();
-    assert_eq!(hex(&vector("lean")), hex(&snapshot.bytes));
-    assert_eq!(hex(&vector("turn")), hex(&delta.bytes));
-    assert_eq!(subscriber.receive(&vector("lean")), Ok(Applied::NewLayout));
-    assert_eq!(subscriber.receive(&vector("turn")), Ok(Applied::Changes(Vec::new())));
-    assert_eq!(subscriber.light_changes(), changes);
-    assert!(common::same_bits(subscriber.store().unwrap(), &store));
+    let leans = [[0, 0], [2, -1], [3, 0], [0, 0]].map(Lean).to_vec();
+    light_vectors(["lean", "turn"], (1, vec![31, 20, 9, 0], Some(leans)), &changes);
 }
 
 /// 64 points in a row, all of which go from 0 to 1.

@@ -165,7 +165,8 @@ function start() {
   const command = document.getElementById("command");
   command.closest(".command").append(copyButton("Copy", () => command.textContent));
   if (location.hash.startsWith("#see:")) {
-    document.getElementById("pictures").scrollIntoView({ behavior: "instant" });
+    // Plots take their height in microtasks, which were queued before this one.
+    queueMicrotask(() => document.getElementById("pictures").scrollIntoView({ behavior: "instant" }));
   }
 }
 
