@@ -13,6 +13,7 @@
 
 #[allow(dead_code)]
 mod bilateral;
+mod cap_pattern;
 mod error;
 mod noise;
 mod obscurance;

@@ -4,15 +4,16 @@
 use std::time::Instant;
 
 use dapple_metrics::{psnr, ssim};
+use dapple_render::area_lights::AreaLightTable;
 use dapple_render::gbuffer::{GBuffer, rasterize};
 use dapple_render::image::{LinearImage, Rgb8Image, ToneMap};
 use dapple_render::shade::shading_points;
-use dapple_render::slc::{Blending, SlcShading, pixel_places, shade_cones};
+use dapple_render::slc::{Blending, ConeLight, SlcShading, pixel_places, shade_cones};
 use dapple_scene::area_lights::Pick;
 use dapple_scene::glam::{Affine3A, Vec3};
 use dapple_scene::{NoFiles, PosedCamera, Scene, ShadingPoint, builtin};
 use dapple_server::cones::{ConeServer, Now, cone_charts};
-use dapple_store::cones::{CacheParams, Charting, LookUp, MomentEntry, View};
+use dapple_store::cones::{CacheParams, Charting, EntryId, EntrySite, LookUp, MomentEntry, View};
 use dapple_trace::Tracer;
 use dapple_trace::direct::{DirectParams, Restir, RestirParams, RestirView, Sequence, trace_direct};
 use dapple_trace::slc::SlcParams;
@@ -82,11 +83,19 @@ fn rays(now: &Now<'_>, points: &[Option<ShadingPoint>], params: &DirectParams) -
     out
 }
 
+fn cone_light<'a>(
+    server: &'a ConeServer<MomentEntry>,
+    table: &'a AreaLightTable,
+) -> ConeLight<'a, MomentEntry, impl Fn(EntryId) -> Option<EntrySite> + Sync + 'a> {
+    ConeLight { cache: server.cache(), place_of: |id| server.place_of(id), lights: Some(table) }
+}
+
 /// Cones of one way to shade, and what they came to.
 struct Run {
     name: &'static str,
     server: ConeServer<MomentEntry>,
     shading: SlcShading,
+    shapes: bool,
     picture: Vec<Vec3>,
     step_ms: Vec<f64>,
 }
@@ -94,7 +103,7 @@ struct Run {
 impl Run {
     fn new(name: &'static str, shading: SlcShading) -> Run {
         let server = ConeServer::new(CacheParams::default(), shading.look_up).unwrap();
-        Run { name, server, shading, picture: Vec::new(), step_ms: Vec::new() }
+        Run { name, server, shading, shapes: true, picture: Vec::new(), step_ms: Vec::new() }
     }
 
     fn step(&mut self, stage: &Stage, now: &Now<'_>, seen: &Seen) {
@@ -103,18 +112,22 @@ impl Run {
         let pixels = pixel_places(&stage.scene, now.pose, camera, gbuffer, points, &stage.charting);
         let view = View { width: stage.size[0] as usize, pixels: &pixels };
         self.server.step(now, &[view], &SlcParams::default(), &mut |_| ());
-        let place_of = |id| self.server.place_of(id);
-        self.picture = shade_cones(self.server.cache(), place_of, points, &pixels, &self.shading);
+        let table = AreaLightTable::new(&now.lights(now.pose));
+        let light = ConeLight { lights: self.shapes.then_some(&table), ..cone_light(&self.server, &table) };
+        self.picture = shade_cones(&light, points, &pixels, &self.shading);
         self.step_ms.push(start.elapsed().as_secs_f64() * 1e3);
     }
 }
 
 fn runs() -> Vec<Run> {
     let near = LookUp { blend: false, ..LookUp::default() };
+    let wide = LookUp { bias: 2.0, ..LookUp::default() };
     vec![
-        Run::new("slc", SlcShading { blending: Blending::Irradiance, ..SlcShading::default() }),
+        Run { shapes: false, ..Run::new("slc by cones alone", SlcShading::default()) },
+        Run::new("slc", SlcShading::default()),
         Run::new("slc, all cones", SlcShading { blending: Blending::Cones, ..SlcShading::default() }),
         Run::new("slc, one texel", SlcShading { look_up: near, ..SlcShading::default() }),
+        Run::new("slc, bias 2", SlcShading { look_up: wide, ..SlcShading::default() }),
     ]
 }
 
@@ -170,6 +183,32 @@ fn the_mean_light_of_a_village_is_that_of_rays() {
     }
 }
 
+/// Lights that move, over entries that had eight frames to follow: light by the shapes of what they see needs fewer samples than their energies.
+#[test]
+fn lights_that_move_are_shaded_by_their_shapes() {
+    let stage = Stage::new("street", 0.1, [96, 54]);
+    let [cones, shapes] = [false, true].map(|shapes| {
+        let mut crowd = Crowd::new(SlcShading::default(), shapes);
+        let mut tracer = Tracer::new(&stage.scene, &stage.scene.pose(stage.time_s));
+        let mut quality = [0.0; 3];
+        for step in 0..8 {
+            let pose = stage.scene.pose(stage.time_s + f64::from(step) / 15.0);
+            tracer.update(&stage.scene, &pose);
+            let now = Now { scene: &stage.scene, pose: &pose, tracer: &tracer, environment: None };
+            let seen = [stage.see(&now)];
+            crowd.step(&stage, &now, &seen);
+            if step == 7 {
+                let params = DirectParams { samples: 256, seed: 7, ..DirectParams::default() };
+                quality = stage.quality(&rays(&now, &seen[0].points, &params), &crowd.pictures[0]);
+            }
+        }
+        quality
+    });
+    println!("cones {cones:?}, shapes {shapes:?}");
+    assert!(shapes[0] > cones[0] + 1.0 && shapes[1] > cones[1], "{shapes:?} {cones:?}");
+    assert!(shapes[0] > 28.0 && shapes[2].abs() < 1.5, "{shapes:?}");
+}
+
 /// Prints the table of `render/src/slc/README.md`: all entries are settled after 260 steps.
 #[test]
 #[ignore = "measures; minutes"]
@@ -183,6 +222,7 @@ fn quality_and_time() {
 /// A step of each rival for all viewers, milliseconds, and its last pictures.
 struct Rival {
     name: &'static str,
+    best: bool,
     reservoirs: Option<Vec<Restir>>,
     samples: u32,
     ms: Vec<f64>,
@@ -191,13 +231,14 @@ struct Rival {
 
 impl Rival {
     fn rays(name: &'static str, samples: u32) -> Rival {
-        Rival { name, reservoirs: None, samples, ms: Vec::new(), pictures: Vec::new() }
+        Rival { name, best: false, reservoirs: None, samples, ms: Vec::new(), pictures: Vec::new() }
     }
 
-    fn all(viewers: usize) -> [Rival; 3] {
+    fn all(viewers: usize) -> [Rival; 4] {
         let reservoirs = Some((0..viewers).map(|_| Restir::new()).collect());
         let restir = Rival { reservoirs, ..Rival::rays("restir-di", 0) };
-        [Rival::rays("rt-16, power", 16), Rival::rays("rt-48, power", 48), restir]
+        let best = Rival { best: true, ..Rival::rays("rt-48, best", 48) };
+        [Rival::rays("rt-16, power", 16), Rival::rays("rt-48, power", 48), best, restir]
     }
 
     /// Cameras of reservoirs must stand still: each sample's past is that of its own pixel.
@@ -207,7 +248,9 @@ impl Rival {
         let same: Vec<u32> = (0..size[0] * size[1]).collect();
         let picture = |(viewer, seen): (usize, &Seen)| {
             let mut out = vec![Vec3::ZERO; seen.points.len()];
-            let (pick, sequence, seed) = (Pick::Power, Sequence::Random, viewer as u64);
+            let (pick, sequence) =
+                if self.best { (Pick::Fluence, Sequence::Lattice) } else { (Pick::Power, Sequence::Random) };
+            let seed = viewer as u64;
             match &mut self.reservoirs {
                 Some(reservoirs) => {
                     let view = RestirView {
@@ -236,15 +279,16 @@ impl Rival {
 struct Crowd {
     server: ConeServer<MomentEntry>,
     shading: SlcShading,
+    shapes: bool,
     ms: Vec<f64>,
     server_ms: Vec<f64>,
     pictures: Vec<Vec<Vec3>>,
 }
 
 impl Crowd {
-    fn new(shading: SlcShading) -> Crowd {
+    fn new(shading: SlcShading, shapes: bool) -> Crowd {
         let server = ConeServer::new(CacheParams::default(), shading.look_up).unwrap();
-        Crowd { server, shading, ms: Vec::new(), server_ms: Vec::new(), pictures: Vec::new() }
+        Crowd { server, shading, shapes, ms: Vec::new(), server_ms: Vec::new(), pictures: Vec::new() }
     }
 
     fn step(&mut self, stage: &Stage, now: &Now<'_>, seen: &[Seen]) {
@@ -258,10 +302,10 @@ impl Crowd {
         let begun = Instant::now();
         self.server.step(now, &views, &SlcParams::default(), &mut |_| ());
         self.server_ms.push(begun.elapsed().as_secs_f64() * 1e3);
-        let place_of = |id| self.server.place_of(id);
-        let shade = |(seen, pixels): (&Seen, &Vec<_>)| {
-            shade_cones(self.server.cache(), place_of, &seen.points, pixels, &self.shading)
-        };
+        let table = AreaLightTable::new(&now.lights(now.pose));
+        let light = ConeLight { lights: self.shapes.then_some(&table), ..cone_light(&self.server, &table) };
+        let shade =
+            |(seen, pixels): (&Seen, &Vec<_>)| shade_cones(&light, &seen.points, pixels, &self.shading);
         self.pictures = seen.iter().zip(&pixels).map(shade).collect();
         self.ms.push(start.elapsed().as_secs_f64() * 1e3);
     }
@@ -283,7 +327,13 @@ fn play(
     let mut rivals = Rival::all(viewers);
     let near = LookUp { blend: false, ..LookUp::default() };
     let one = SlcShading { look_up: near, ..SlcShading::default() };
-    let mut crowds = [Crowd::new(SlcShading::default()), Crowd::new(one)];
+    let wide = LookUp { bias: 2.0, ..LookUp::default() };
+    let mut crowds = [
+        ("slc by cones alone", Crowd::new(SlcShading::default(), false)),
+        ("slc", Crowd::new(SlcShading::default(), true)),
+        ("slc, one texel", Crowd::new(one, true)),
+        ("slc, bias 2", Crowd::new(SlcShading { look_up: wide, ..SlcShading::default() }, true)),
+    ];
     let mut tracer = Tracer::new(&stage.scene, &stage.scene.pose(stage.time_s));
     for step in 0..steps {
         let pose = stage.scene.pose(stage.time_s + f64::from(step) / 15.0);
@@ -296,7 +346,7 @@ fn play(
                 rival.step(&now, stage.size, &seen, u64::from(step));
             }
         }
-        for crowd in &mut crowds {
+        for (_, crowd) in &mut crowds {
             crowd.step(stage, &now, &seen);
         }
         if step + 1 < steps {
@@ -321,7 +371,7 @@ fn play(
         for rival in &rivals {
             line(rival.name, last(&rival.ms), last(&rival.ms), quality(&rival.pictures));
         }
-        for (name, crowd) in ["slc", "slc, one texel"].iter().zip(&crowds) {
+        for (name, crowd) in &crowds {
             line(name, last(&crowd.ms), last(&crowd.server_ms), quality(&crowd.pictures));
         }
     }

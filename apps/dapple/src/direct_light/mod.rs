@@ -3,9 +3,10 @@
 pub(crate) mod picture;
 
 use anyhow::Result;
+use dapple_render::area_lights::AreaLightTable;
 use dapple_render::gbuffer::{GBuffer, rasterize};
 use dapple_render::shade::shading_points;
-use dapple_render::slc::{Caps, Form, Samples, SlcShading, pixel_places, shade_cones};
+use dapple_render::slc::{Caps, ConeLight, Form, Samples, SlcShading, pixel_places, shade_cones};
 use dapple_scene::area_lights::{AreaLights, MAX_LIGHT_TRIANGLES, Pick};
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Pose, PosedCamera, Projection, Scene, ShadingPoint};
@@ -69,7 +70,16 @@ pub(crate) enum Technique {
     /// The paper's cones.
     PaperCones { params: PaperParams, look_up: LookUp },
     /// Ours.
-    Cones { params: SlcParams, look_up: LookUp, samples: Samples },
+    Cones(OurCones),
+}
+
+/// Our cones: how they are kept and shaded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct OurCones {
+    pub(crate) params: SlcParams,
+    pub(crate) shading: SlcShading,
+    /// Whether light of one light is shaded by that light's own shape.
+    pub(crate) shapes: bool,
 }
 
 impl Technique {
@@ -84,34 +94,32 @@ impl Technique {
     }
 
     pub(crate) fn cones() -> Technique {
-        Technique::Cones {
-            params: SlcParams::default(),
-            look_up: LookUp::default(),
-            samples: Samples::Adaptive,
-        }
+        let (params, shading) = (SlcParams::default(), SlcShading::default());
+        Technique::Cones(OurCones { params, shading, shapes: true })
     }
-}
 
-impl Technique {
     /// Our cones, sampled otherwise.
     pub(crate) fn with_sampler(self, sampler: Sampler) -> Technique {
         let (pick, sequence) = sampler.parts();
-        match self {
-            Technique::Cones { params, look_up, samples } => {
-                Technique::Cones { params: SlcParams { pick, sequence, ..params }, look_up, samples }
-            }
-            other => other,
-        }
+        self.changed(|cones| cones.params = SlcParams { pick, sequence, ..cones.params })
     }
 
     /// Our cones, of a pixel's own texel alone.
     pub(crate) fn without_blending(self) -> Technique {
-        match self {
-            Technique::Cones { params, look_up, samples } => {
-                Technique::Cones { params, look_up: LookUp { blend: false, ..look_up }, samples }
-            }
-            other => other,
+        self.changed(|cones| cones.shading.look_up.blend = false)
+    }
+
+    /// Our cones, of texels so many pixels wide.
+    pub(crate) fn with_texels(self, pixels: f32) -> Technique {
+        self.changed(|cones| cones.shading.look_up.bias = pixels)
+    }
+
+    /// Our cones, changed.
+    pub(crate) fn changed(mut self, change: impl FnOnce(&mut OurCones)) -> Technique {
+        if let Technique::Cones(cones) = &mut self {
+            change(cones);
         }
+        self
     }
 }
 
@@ -150,7 +158,7 @@ pub(crate) enum Lighter {
     Ris { sampler: Sampler, frame: u64 },
     Restir(Box<Reservoirs>),
     Paper(Box<(ConeServer<BoundingEntry>, PaperParams, LookUp)>),
-    Cones(Box<(ConeServer<MomentEntry>, SlcParams, LookUp, Samples)>),
+    Cones(Box<(ConeServer<MomentEntry>, OurCones)>),
 }
 
 impl Lighter {
@@ -168,11 +176,9 @@ impl Lighter {
             Technique::PaperCones { params, look_up } => {
                 Lighter::Paper(Box::new((ConeServer::new(CacheParams::default(), look_up)?, params, look_up)))
             }
-            Technique::Cones { params, look_up, samples } => Lighter::Cones(Box::new((
-                ConeServer::new(CacheParams::default(), look_up)?,
-                params,
-                look_up,
-                samples,
+            Technique::Cones(cones) => Lighter::Cones(Box::new((
+                ConeServer::new(CacheParams::default(), cones.shading.look_up)?,
+                cones,
             ))),
         })
     }
@@ -245,17 +251,12 @@ impl Lighter {
                     samples: Samples::Fixed(16),
                     ..SlcShading::default()
                 };
-                with_cones(server, now, seen, charting, params, &shading, pass)
+                with_cones(server, now, None, seen, charting, params, &shading, pass)
             }
             Lighter::Cones(of) => {
-                let (server, params, look_up, samples) = &mut **of;
-                let shading = SlcShading {
-                    look_up: *look_up,
-                    form: Form::Ratio,
-                    samples: *samples,
-                    ..SlcShading::default()
-                };
-                with_cones(server, now, seen, charting, params, &shading, pass)
+                let (server, OurCones { params, shading, shapes }) = &mut **of;
+                let table = shapes.then(|| AreaLightTable::new(lights));
+                with_cones(server, now, table.as_ref(), seen, charting, params, shading, pass)
             }
         }
     }
@@ -317,9 +318,11 @@ fn previous_pixels(now: &Now<'_>, pose: &Pose, camera: &PosedCamera, gbuffer: &G
     })
 }
 
+#[expect(clippy::too_many_arguments, reason = "what one frame of all viewers is made of")]
 fn with_cones<E: Update + Caps>(
     server: &mut ConeServer<E>,
     now: &Now<'_>,
+    lights: Option<&AreaLightTable>,
     seen: &[Seen],
     charting: &Charting,
     params: &E::Params,
@@ -341,7 +344,8 @@ fn with_cones<E: Update + Caps>(
         .iter()
         .zip(&pixels)
         .map(|(seen, pixels)| {
-            shade_cones(server.cache(), |id| server.place_of(id), &seen.points, pixels, shading)
+            let light = ConeLight { cache: server.cache(), place_of: |id| server.place_of(id), lights };
+            shade_cones(&light, &seen.points, pixels, shading)
         })
         .collect();
     pass("shading");

@@ -8,7 +8,7 @@ use dapple_store::points::orthonormal_basis;
 use glam::Vec3;
 
 use super::Arrival;
-use crate::slc::cap::{EIGHT, FOUR, ONE, Pattern, SIXTEEN};
+use crate::cap_pattern::{EIGHT, FOUR, ONE, Pattern, SIXTEEN};
 
 /// Mean cosine below which a cone is not taken at its word.
 const LEAST_COSINE: f32 = 0.01;
@@ -17,10 +17,10 @@ const LEAST_COSINE: f32 = 0.01;
 const LEAST_LEAN: f32 = 1.0 / 64.0;
 
 /// Alpha from which on it is not seen which part of a light is hidden.
-const ROUGH_ALPHA: f32 = 0.36;
+pub(crate) const ROUGH_ALPHA: f32 = 0.36;
 
 /// A surface about to be lit.
-pub(super) struct Surface<'a> {
+pub(crate) struct Surface<'a> {
     point: &'a ShadingPoint,
     n_dot_v_signed: f32,
     n_dot_v: f32,
@@ -39,7 +39,7 @@ struct Sums {
 }
 
 impl<'a> Surface<'a> {
-    pub(super) fn of(point: &'a ShadingPoint) -> Surface<'a> {
+    pub(crate) fn of(point: &'a ShadingPoint) -> Surface<'a> {
         let n_dot_v_signed = point.normal_shading_world.dot(point.to_viewer_world);
         let a2 = point.reflectance.alpha * point.reflectance.alpha;
         Surface { point, n_dot_v_signed, n_dot_v: n_dot_v_signed.clamp(1e-3, 1.0), a2 }
@@ -47,7 +47,7 @@ impl<'a> Surface<'a> {
 
     /// Radiance that a cone's light leaves towards the viewer, of irradiance on the surface's shading normal. Gloss is so wide that the directions of the
     /// pattern run into each other: each stands for its part of the cone. On smooth surfaces wide cones are mirrored whole, not as dots.
-    pub(super) fn reflect(&self, arrival: &Arrival) -> Vec3 {
+    pub(crate) fn reflect(&self, arrival: &Arrival) -> Vec3 {
         let count = self.needed(arrival);
         // Half vectors turn by half of what directions do; α is about the tangent of the lobe's half width.
         let part = (1.0 - arrival.cos_angle) / (2 * count) as f32;

@@ -14,13 +14,13 @@ pub(crate) mod table;
 mod tests;
 
 use dapple_scene::ShadingPoint;
-use dapple_scene::area_lights::{AreaLights, LightFigure};
+use dapple_scene::area_lights::{AreaLights, LightFigure, LightForm};
 use dapple_store::light_visibility::SeenLight;
 use glam::Vec3;
 use rayon::prelude::*;
 
 pub use arrival::Arrival;
-use gloss::Surface;
+pub(crate) use gloss::{ROUGH_ALPHA, Surface};
 
 /// Most lights that are shown.
 pub const MAX_AREA_LIGHTS: usize = 64;
@@ -73,6 +73,17 @@ impl AreaLightTable {
     /// The lights that are shown, by their index in [`AreaLights`], ascending.
     pub fn lights(&self) -> &[u32] {
         &self.lights
+    }
+
+    /// Where a light is in [`AreaLightTable::lights`], if it is shown by its very form: not one that a few places stand for.
+    pub fn slot_of_form(&self, light: u32) -> Option<usize> {
+        // Mostly all lights are shown.
+        let slot = match self.lights.get(light as usize) {
+            Some(&same) if same == light => light as usize,
+            _ => self.lights.binary_search(&light).ok()?,
+        };
+        let is_form = |entry: &Entry| !matches!(entry.figure.form, LightForm::Places(_));
+        self.entries[slot].as_ref().is_some_and(is_form).then_some(slot)
     }
 
     /// Whether no light shines.

@@ -1,13 +1,13 @@
 //! Light of cones, reflected: a fixed pattern of directions in each, and glTF's reflectance in lanes, of several cones at once.
 
 use std::f32::consts::FRAC_1_PI;
-use std::sync::LazyLock;
 
 use dapple_scene::ShadingPoint;
 use dapple_store::points::orthonormal_basis;
 use glam::Vec3;
 
 use super::SlcShading;
+use crate::cap_pattern::{EIGHT, FOUR, ONE, Pattern, SIXTEEN, SIXTY_FOUR};
 
 /// A cone: light that comes, evenly, from all directions of a cap.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,6 +20,15 @@ pub struct Cap {
     pub energy: Vec3,
     /// Energy ÷ fluence, above 0 and up to 1: with irradiance, the mean cosine of the light at the entry.
     pub mean_cosine: f32,
+}
+
+impl Cap {
+    /// Irradiance on a surface with this unit normal, W/m², as if the cone did not cross the horizon: by the mean of its directions, which is
+    /// (1 + cos a) / 2 long.
+    pub(super) fn irradiance(&self, normal_world: Vec3) -> Vec3 {
+        let cosine = normal_world.dot(self.direction).max(0.0) * 0.5 * (1.0 + self.cos_angle);
+        self.energy * (cosine / self.mean_cosine)
+    }
 }
 
 /// What an entry's energies are.
@@ -43,37 +52,6 @@ pub enum Samples {
     /// Always so many: the largest of 1, 4, 8, 16 and 64 that is no more than this.
     Fixed(u32),
 }
-
-/// Directions evenly in a cap, by lanes: part of the cap's height, and the turn about the axis.
-pub(crate) struct Pattern<const N: usize> {
-    pub(crate) height: [f32; N],
-    pub(crate) cos: [f32; N],
-    pub(crate) sin: [f32; N],
-}
-
-impl<const N: usize> Pattern<N> {
-    /// A spiral of golden turns, the same for all: patterns that differ from sample to sample would be noise.
-    fn new() -> Pattern<N> {
-        const GOLDEN_TURN: f64 = 2.399_963_229_728_653;
-        let mut pattern = Pattern { height: [0.0; N], cos: [1.0; N], sin: [0.0; N] };
-        for i in 0..N {
-            let turn = i as f64 * GOLDEN_TURN;
-            pattern.height[i] = ((i as f64 + 0.5) / N as f64) as f32;
-            pattern.cos[i] = libm::cos(turn) as f32;
-            pattern.sin[i] = libm::sin(turn) as f32;
-        }
-        if N == 1 {
-            pattern.height[0] = 0.0;
-        }
-        pattern
-    }
-}
-
-pub(crate) static ONE: LazyLock<Pattern<1>> = LazyLock::new(Pattern::new);
-pub(crate) static FOUR: LazyLock<Pattern<4>> = LazyLock::new(Pattern::new);
-pub(crate) static EIGHT: LazyLock<Pattern<8>> = LazyLock::new(Pattern::new);
-pub(crate) static SIXTEEN: LazyLock<Pattern<16>> = LazyLock::new(Pattern::new);
-static SIXTY_FOUR: LazyLock<Pattern<64>> = LazyLock::new(Pattern::new);
 
 /// Directions that are shaded together. A cone of 64 fills them.
 const LANES: usize = 64;

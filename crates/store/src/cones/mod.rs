@@ -28,5 +28,5 @@ pub use key::{
     BACK, BLOCK_SIDE, BLOCK_TEXELS, BlockKey, COARSEST_LEVEL, FINEST_LEVEL, SLABS, TexelKey, level_of,
 };
 pub use lights::LightSet;
-pub use moment::{MOST_MOMENT_CONES, MomentCone, MomentEntry, MomentParams, ReAim};
+pub use moment::{HiddenSample, MOST_MOMENT_CONES, MomentCone, MomentEntry, MomentParams, ReAim};
 pub use packed::{PAPER_BITS, PackedMoment, PackedPaper, energy_from_bits, energy_to_bits};

@@ -19,7 +19,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use dapple_scene::area_lights::{AreaLights, Chooser, Pick};
 use dapple_scene::glam::Vec3;
-use dapple_store::cones::{ConeCache, ConeEntry, ConeSample, MomentEntry, MomentParams, UpdateQueue};
+use dapple_store::cones::{
+    BLOCK_SIDE, ConeCache, ConeEntry, ConeSample, EntryId, HiddenSample, MomentEntry, MomentParams,
+    UpdateQueue, luminance,
+};
 
 use crate::bvh::{Tracer, offset_origin};
 use crate::direct::{Draws, Sequence};
@@ -143,30 +146,43 @@ impl Update for MomentEntry {
                 // Of a light that was not there, what the entry knows says nothing.
                 let kept = if change.new > LEAST_SHARE { kept.min(1.0 / change.new) } else { kept / root };
                 entry.cut_confidence(kept.clamp(1.0, 4095.0) as u16);
+                if change.new <= LEAST_SHARE && is_plain(entry) && !is_turn(texel.id, frame) {
+                    return false;
+                }
                 count = count.max(libm::ceilf(params.first_samples as f32 * root) as u32);
             }
             let count = count.min(MAX_SAMPLES);
             if count == 0 {
                 return false;
             }
-            let mut samples = Vec::with_capacity(count as usize);
-            let traced = take_samples(
-                tracer,
-                lights,
-                place,
-                &source,
-                site,
-                (0..count).map(|i| entry.taken().wrapping_add(i)),
-                &mut samples,
-            );
-            rays.fetch_add(traced, Ordering::Relaxed);
-            entry.update(&samples, count, &params.moment);
+            let indices = (0..count).map(|i| entry.taken().wrapping_add(i));
+            let drawn = take_samples(tracer, lights, place, &source, site, indices);
+            rays.fetch_add(drawn.rays, Ordering::Relaxed);
+            let picked = |light| drawn.chooser.probability(lights, light as usize);
+            entry.update_seen(&drawn.samples, &drawn.hidden, count, picked, &params.moment);
             true
         });
         // A queue of another frame is the caller's mistake, and updates nothing.
         let updated = updated.unwrap_or(0);
         SlcCounts { updated, rays: rays.into_inner(), changed: changed.into_inner() }
     }
+}
+
+/// Part of a light from which on all of it is seen.
+const ALL_SEEN: f32 = 0.98;
+
+/// Whether an entry sees all of a light or nothing, of every one: while that stays so, it needs no samples to follow lights that move, and a shadow that
+/// comes is found a frame later.
+fn is_plain(entry: &MomentEntry) -> bool {
+    f32::from(entry.samples()) >= KEPT
+        && entry.cones().iter().all(|cone| entry.seen_of(cone.lights) >= ALL_SEEN)
+}
+
+/// Whether it is an entry's turn, of two frames in one: its neighbours' is in the other, and pixels blend both.
+fn is_turn(id: EntryId, frame: u32) -> bool {
+    let side = BLOCK_SIDE as usize;
+    let (x, y) = (id.index() % side, id.index() / side);
+    (x + y + frame as usize).is_multiple_of(2)
 }
 
 /// Samples of an entry about which nothing changed. Rays from one place together are quicker than apart, so a grown entry takes several in
@@ -201,7 +217,19 @@ struct Source {
     with_cosine: bool,
 }
 
-/// Sends rays to lights: the samples that reached one. Tells how many rays were needed.
+/// Samples of light at one place.
+struct Drawn {
+    /// Those that reached a light.
+    samples: Vec<ConeSample>,
+    /// Those that something stood in the way of.
+    hidden: Vec<HiddenSample>,
+    /// What picked their lights.
+    chooser: Chooser,
+    /// How many rays were needed.
+    rays: u64,
+}
+
+/// Sends rays to lights.
 fn take_samples(
     tracer: &Tracer,
     lights: &AreaLights<'_>,
@@ -209,8 +237,7 @@ fn take_samples(
     source: &Source,
     site: u64,
     indices: impl ExactSizeIterator<Item = u32>,
-    samples: &mut Vec<ConeSample>,
-) -> u64 {
+) -> Drawn {
     let normal = place.normal_world;
     // Places on lights are chosen from where rays leave, so that a ray ends where its sample lies: moved by that little, it would end behind the
     // face of a light that is near, or seen at a grazing angle.
@@ -221,6 +248,7 @@ fn take_samples(
     let draws = Draws::new(source.sequence, source.seed, site, 0, 1);
     let mut chooser = Chooser::new(source.pick);
     chooser.aim(lights, origin, faced);
+    let mut samples = Vec::with_capacity(indices.len());
     let mut reaches: Vec<Vec3> = Vec::with_capacity(indices.len());
     for i in indices {
         let Some(sample) = lights.sample(&chooser, origin, draws.at(i)) else {
@@ -241,9 +269,14 @@ fn take_samples(
     }
     let blocked = tracer.occlusion(origin, &reaches, 1.0);
     let mut i = 0;
-    samples.retain(|_| {
+    let mut hidden = Vec::new();
+    samples.retain(|sample| {
         i += 1;
-        blocked[(i - 1) / 64] >> ((i - 1) % 64) & 1 == 0
+        let is_hidden = blocked[(i - 1) / 64] >> ((i - 1) % 64) & 1 == 1;
+        if is_hidden {
+            hidden.push(HiddenSample { light: sample.light, value: luminance(sample.value) });
+        }
+        !is_hidden
     });
-    reaches.len() as u64
+    Drawn { samples, hidden, chooser, rays: reaches.len() as u64 }
 }

@@ -69,17 +69,10 @@ impl Update for BoundingEntry {
             let count = if young { params.first_samples } else { params.samples }.min(MAX_SAMPLES);
             let site = site_of(texel.instance, texel.place.triangle, texel.place.barycentrics);
             let taken = entry.taken();
-            let mut samples = Vec::with_capacity(count as usize);
-            let mut traced = take_samples(
-                tracer,
-                lights,
-                place,
-                &source,
-                site,
-                (0..count).map(|i| taken.wrapping_add(i)),
-                &mut samples,
-            );
-            let mut cycle = entry.update(&samples, count, &params.bounding);
+            let indices = (0..count).map(|i| taken.wrapping_add(i));
+            let drawn = take_samples(tracer, lights, place, &source, site, indices);
+            let mut traced = drawn.rays;
+            let mut cycle = entry.update(&drawn.samples, count, &params.bounding);
             if params.probes {
                 let from = offset_origin(place.position_world, place.normal_world);
                 let probes: Vec<Probe> = (0..entry.cones().len())

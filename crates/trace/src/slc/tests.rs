@@ -275,9 +275,10 @@ fn cones_follow_a_light_that_moves() {
         let at = Vec3::new(0.1 * step as f32, 2.0, 0.0);
         now.instances[1].world_from_mesh = Affine3A::from_translation(at);
         let counts = rig.step(&mut cache, &before, &now, &params);
-        assert_eq!(counts.changed, counts.updated);
+        // It is seen whole: half of the entries take samples, those that do not follow it without.
+        assert!((counts.updated * 2).abs_diff(counts.changed) <= counts.changed / 8, "{counts:?}");
         let (d2, cos) = (at.length_squared(), 2.0 / at.length());
-        assert_near(mean(&cache), 10.0 * PI * 0.09 / d2 * cos, 0.03);
+        assert_near(mean(&cache), 10.0 * PI * 0.09 / d2 * cos, 0.04);
         for id in cache.ids() {
             let sum = cache.entry(id).unwrap().cones().iter().fold(Vec3::ZERO, |sum, cone| sum + cone.moment);
             assert!(sum.normalize().dot(at.normalize()) > 0.99, "step {step}: {sum}");

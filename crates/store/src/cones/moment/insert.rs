@@ -79,6 +79,9 @@ impl MomentEntry {
             heir.energy += cone.energy;
             heir.fluence += cone.fluence;
             heir.moment *= heir.fluence / before;
+            if heir.lights == cone.lights {
+                heir.hidden += cone.hidden;
+            }
         }
     }
 

@@ -20,6 +20,9 @@ pub const MOST_MOMENT_CONES: usize = 4;
 /// Mean cosine of a cone's light below which it is taken to be this: keeps what gloss there is of grazing light within bounds.
 const LEAST_COSINE: f32 = 1.0 / 4096.0;
 
+/// Samples of a light that an entry should stand for before it tells how much of the light is seen.
+const LEAST_TAKEN: f32 = 1.0;
+
 /// How moment cones are kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MomentParams {
@@ -90,6 +93,12 @@ pub struct MomentCone {
     pub moment: Vec3,
     /// Where the energy came from.
     pub lights: LightSet,
+    /// Luminance of what would arrive, too, of its light if nothing stood in the way, W/m²: of samples that something hid.
+    pub hidden: f32,
+    /// What arrives through it of all that would arrive of its light if nothing stood in the way, above 0 and up to 1: E / (E + what was hidden), which
+    /// is certain as soon as nothing hides it, however few samples there are. 0 where that is not known: of cones of several lights, of lights that have
+    /// a part in one, and where too few samples were to be of the light.
+    pub seen: f32,
 }
 
 impl MomentCone {
@@ -135,7 +144,7 @@ impl MomentCone {
     ) -> MomentCone {
         let fluence = luminance(energy) / mean_cosine.clamp(LEAST_COSINE, 1.0);
         let length = fluence * 0.5 * (1.0 + cos_angle.clamp(-1.0, 1.0));
-        MomentCone { energy, fluence, moment: direction * length, lights }
+        MomentCone { energy, fluence, moment: direction * length, lights, ..MomentCone::default() }
     }
 
     /// Luminance of the energy ÷ fluence, 2⁻¹² … 1: with irradiance, the mean cosine of the light.
@@ -151,14 +160,25 @@ impl MomentCone {
         self.energy *= factor;
         self.fluence *= factor;
         self.moment *= factor;
+        self.hidden *= factor;
     }
 
     fn absorb(&mut self, other: &MomentCone) {
         self.energy += other.energy;
         self.fluence += other.fluence;
         self.moment += other.moment;
+        self.hidden += other.hidden;
         self.lights = self.lights.union(other.lights);
     }
+}
+
+/// A sample that something hid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HiddenSample {
+    /// Index of the light.
+    pub light: u32,
+    /// Luminance of what the sample would have been worth, W/m².
+    pub value: f32,
 }
 
 /// A light's new place as seen from an entry: see [`MomentEntry::re_aim`].
@@ -195,6 +215,8 @@ impl MomentEntry {
         for cone in cones.iter().take(MOST_MOMENT_CONES) {
             let valid = cone.energy.is_finite()
                 && cone.moment.is_finite()
+                && (0.0..=MOST_ENERGY).contains(&cone.hidden)
+                && (0.0..=1.0).contains(&cone.seen)
                 && cone.fluence.is_finite()
                 && cone.energy.min_element() >= 0.0;
             if valid && luminance(cone.energy) >= LEAST_ENERGY {
@@ -209,6 +231,12 @@ impl MomentEntry {
     #[inline]
     pub fn cones(&self) -> &[MomentCone] {
         &self.cones[..usize::from(self.count)]
+    }
+
+    /// How much is seen of the light of a cone through all of its cones, up to 1; 0 where that is not known.
+    #[inline]
+    pub fn seen_of(&self, lights: LightSet) -> f32 {
+        self.cones().iter().filter(|cone| cone.lights == lights).map(|cone| cone.seen).sum()
     }
 
     /// Samples that it stands for: C.
@@ -226,17 +254,32 @@ impl MomentEntry {
         self.cones().iter().fold(Vec3::ZERO, |sum, cone| sum + cone.energy)
     }
 
-    /// Takes the samples of one update: `drawn` were drawn, of which those in `samples` reached a light; the others are zeros. With
-    /// N drawn, β = N / (C + N) and
+    /// [`MomentEntry::update_seen`] where nothing is known of what was hidden.
+    pub fn update(&mut self, samples: &[ConeSample], drawn: u32, params: &MomentParams) {
+        self.update_seen(samples, &[], drawn, |_| 0.0, params);
+    }
+
+    /// Takes the samples of one update: `drawn` were drawn, of which those in `samples` reached a light; the others are zeros, among them those
+    /// that something `hidden` from the place. With N drawn, β = N / (C + N) and
     ///
     /// E ← (1 − β) E + β/N Σ x, Φ ← (1 − β) Φ + β/N Σ φ, m ← (1 − β) m + β/N Σ φ w with φ = lum(x) / cosine, C ← min(C + N, C_max)
     ///
     /// for every cone, over the samples that went to it. So the energies of all cones add up to the mean of all samples (with
-    /// C at its limit, a mean that forgets), to rounding, in whatever order they come.
+    /// C at its limit, a mean that forgets), to rounding, in whatever order they come. What was hidden is kept in the same way beside E.
     ///
-    /// Parameters out of range act as the nearest that is not. `drawn` is at least the number of samples.
-    pub fn update(&mut self, samples: &[ConeSample], drawn: u32, params: &MomentParams) {
-        let drawn = drawn.max(u32::try_from(samples.len()).unwrap_or(u32::MAX));
+    /// `picked` is how likely a sample is to be one of a light: where one or more of those that the entry stands for should be, it is known how much of it
+    /// is seen. It must not go by how many were: that would leave out the darkest.
+    ///
+    /// Parameters out of range act as the nearest that is not. `drawn` is at least the number of samples, hidden ones too.
+    pub fn update_seen(
+        &mut self,
+        samples: &[ConeSample],
+        hidden: &[HiddenSample],
+        drawn: u32,
+        picked: impl Fn(u32) -> f32,
+        params: &MomentParams,
+    ) {
+        let drawn = drawn.max(u32::try_from(samples.len() + hidden.len()).unwrap_or(u32::MAX));
         if drawn == 0 {
             return;
         }
@@ -245,19 +288,54 @@ impl MomentEntry {
         for cone in &mut self.cones[..usize::from(self.count)] {
             cone.scale(kept);
         }
+        let before = self.cones.map(|cone| cone.lights);
         for sample in samples {
             if let Some((value, direction)) = sample.usable() {
                 let value = value * weight;
                 let fluence = luminance(value) / sample.cosine.clamp(LEAST_COSINE, 1.0);
                 let moment = direction * fluence;
-                let cone = MomentCone { energy: value, fluence, moment, lights: LightSet::one(sample.light) };
+                let lights = LightSet::one(sample.light);
+                let cone = MomentCone { energy: value, fluence, moment, lights, ..MomentCone::default() };
                 self.insert(&cone, direction, sample.light, params);
+            }
+        }
+        for i in 0..usize::from(self.count) {
+            let lights = self.cones[i].lights;
+            // Of several cones of a light, the first keeps what was hidden of it.
+            let is_first = self.cones[..i].iter().all(|cone| cone.lights != lights);
+            let Some(light) = lights.single().filter(|_| is_first) else { continue };
+            let of_light = hidden.iter().filter(|sample| sample.light == light && sample.value.is_finite());
+            let now = of_light.map(|sample| sample.value.clamp(0.0, MOST_ENERGY)).sum::<f32>() * weight;
+            self.cones[i].hidden += now;
+            if !before.contains(&lights) {
+                // Until now nothing of it was seen: the samples before were all hidden, and worth what these are.
+                let seen: f32 =
+                    self.cones().iter().filter(|c| c.lights == lights).map(|c| luminance(c.energy)).sum();
+                self.cones[i].hidden += (seen + now) * f32::from(self.samples) / drawn as f32;
             }
         }
         let most = u32::from(params.max_samples.max(1));
         self.samples = (u32::from(self.samples).saturating_add(drawn)).min(most) as u16;
         self.taken = self.taken.wrapping_add(drawn);
         self.settle(params);
+        for i in 0..usize::from(self.count) {
+            self.cones[i].seen = self.seen(&self.cones[i], &picked).unwrap_or(0.0);
+        }
+    }
+
+    /// [`MomentCone::seen`] of one of the cones.
+    fn seen(&self, cone: &MomentCone, picked: impl Fn(u32) -> f32) -> Option<f32> {
+        let light = cone.lights.single()?;
+        let mut all = 0.0;
+        for other in self.cones() {
+            if other.lights == cone.lights {
+                all += luminance(other.energy) + other.hidden;
+            } else if other.lights.may_hold(light) {
+                return None;
+            }
+        }
+        let is_known = picked(light) * f32::from(self.samples) >= LEAST_TAKEN && all > 0.0;
+        is_known.then(|| (luminance(cone.energy) / all).min(1.0))
     }
 
     /// Brings C down to `most`, so that what comes next counts for more.
@@ -289,7 +367,12 @@ impl MomentEntry {
             let energy = (cone.energy * aim.energy_ratio).min(Vec3::splat(MOST_ENERGY));
             let fluence = cone.fluence * aim.fluence_ratio;
             let cosine = if fluence > 0.0 { luminance(energy) / fluence } else { 1.0 };
-            *cone = MomentCone::from_cap(direction, libm::cosf(angle), energy, cosine, cone.lights);
+            let hidden = (cone.hidden * aim.energy_ratio).min(MOST_ENERGY);
+            *cone = MomentCone {
+                hidden,
+                seen: cone.seen,
+                ..MomentCone::from_cap(direction, libm::cosf(angle), energy, cosine, cone.lights)
+            };
             turned += 1;
         }
         self.drop_dark();

@@ -314,3 +314,106 @@ fn parameters_out_of_range_are_named() {
         assert!(error.contains(name), "{error}");
     }
 }
+
+fn hidden(light: u32, value: f32) -> HiddenSample {
+    HiddenSample { light, value }
+}
+
+#[test]
+fn what_nothing_hides_is_seen_whole_from_the_first_sample() {
+    let mut entry = MomentEntry::default();
+    // Values of samples differ, as those of a wide light do.
+    for (degrees, value) in [(10.0, 0.2), (14.0, 3.0), (12.0, 0.7)] {
+        let one = sample(tilted(degrees), Vec3::splat(value), 4);
+        entry.update_seen(&[one], &[], 1, |_| 1.0, &MomentParams::default());
+        let seen: f32 = entry.cones().iter().map(|cone| cone.seen).sum();
+        assert!((seen - 1.0).abs() < 1e-6, "{entry:?}");
+    }
+}
+
+#[test]
+fn what_is_seen_is_the_mean_of_seen_and_hidden_samples() {
+    let params = MomentParams::default();
+    let mut entry = MomentEntry::default();
+    for i in 0..400u32 {
+        let (light, value) = (i % 2, if i % 2 == 0 { 2.0 } else { 0.5 });
+        let direction = tilted(if light == 0 { 20.0 } else { -50.0 });
+        // Of light 0 one of four is hidden, of light 1 three of four.
+        let is_hidden = if light == 0 { i / 2 % 4 == 0 } else { i / 2 % 4 != 0 };
+        let shown = [sample(direction, Vec3::splat(value), light)];
+        let (lit, dark): (&[_], Vec<_>) = if is_hidden {
+            (&[], vec![hidden(light, luminance(Vec3::splat(value)))])
+        } else {
+            (&shown, Vec::new())
+        };
+        entry.update_seen(lit, &dark, 1, |_| 0.5, &params);
+    }
+    let of = |light| {
+        entry.cones().iter().filter(|c| c.lights.single() == Some(light)).map(|c| c.seen).sum::<f32>()
+    };
+    assert!((of(0) - 0.75).abs() < 0.01 && (of(1) - 0.25).abs() < 0.02, "{} {}", of(0), of(1));
+    let aim = ReAim {
+        light: 0,
+        from: tilted(20.0),
+        to: tilted(30.0),
+        energy_ratio: 0.5,
+        fluence_ratio: 0.5,
+        size_ratio: 1.0,
+    };
+    let before = of(0);
+    let mut moved = entry;
+    assert_eq!(moved.re_aim(&aim), 1);
+    let cone = moved.cones().iter().find(|c| c.lights.single() == Some(0)).unwrap();
+    assert!((luminance(cone.energy) / (luminance(cone.energy) + cone.hidden) - before).abs() < 1e-3);
+    assert_eq!(cone.seen, before, "a light that moves is hidden as much as before until samples tell");
+}
+
+#[test]
+fn a_light_that_comes_out_was_hidden_until_then() {
+    let params = MomentParams::default();
+    let mut entry = MomentEntry::default();
+    for _ in 0..30 {
+        entry.update_seen(&[], &[hidden(3, 1.0)], 1, |_| 1.0, &params);
+    }
+    assert!(entry.cones().is_empty());
+    let ten = [sample(Vec3::Z, Vec3::ONE, 3); 10];
+    entry.update_seen(&ten, &[], 10, |_| 1.0, &params);
+    assert!((entry.cones()[0].seen - 0.25).abs() < 1e-3, "{:?}", entry.cones()[0]);
+    assert!((luminance(entry.energy()) - 0.25).abs() < 1e-3, "as its energy says");
+}
+
+#[test]
+fn what_is_not_known_is_not_told() {
+    let params = MomentParams { cones: 1, ..MomentParams::default() };
+    let [a, b] = [sample(tilted(20.0), Vec3::ONE, 0), sample(tilted(-20.0), Vec3::ONE, 1)];
+    let mut mixed = MomentEntry::default();
+    mixed.update_seen(&[a, b], &[], 2, |_| 1.0, &params);
+    assert!(mixed.cones().iter().all(|cone| cone.seen == 0.0), "several lights in a cone");
+    let mut rare = MomentEntry::default();
+    rare.update_seen(&[a], &[], 8, |_| 0.1, &params);
+    assert!(rare.cones()[0].seen == 0.0, "less than one sample of it was to be");
+    let mut plain = MomentEntry::default();
+    plain.update(&[a], 8, &params);
+    assert!(plain.cones()[0].seen == 0.0, "nothing is said of what was hidden");
+}
+
+proptest! {
+    #[test]
+    fn parts_that_are_seen_are_parts(
+        draws in prop::collection::vec((any_sample(), any::<bool>()), 1..120),
+        params in any_params(),
+    ) {
+        let mut entry = MomentEntry::default();
+        for chunk in draws.chunks(7) {
+            let lit: Vec<_> = chunk.iter().filter(|d| !d.1).map(|d| d.0).collect();
+            let dark: Vec<_> = chunk.iter().filter(|d| d.1).map(|d| hidden(d.0.light, luminance(d.0.value))).collect();
+            entry.update_seen(&lit, &dark, chunk.len() as u32, |_| 0.2, &params);
+            for light in 0..5 {
+                let of = entry.cones().iter().filter(|c| c.lights.single() == Some(light));
+                let sum: f32 = of.map(|c| c.seen).sum();
+                prop_assert!((0.0..1.0001).contains(&sum), "{sum}");
+            }
+            prop_assert!(entry.cones().iter().all(|c| c.hidden.is_finite() && c.hidden >= 0.0));
+        }
+    }
+}

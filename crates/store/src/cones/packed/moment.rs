@@ -1,10 +1,10 @@
-//! Our entry in 16 bytes a cone and four more.
+//! Our entry in 17 bytes a cone and four more.
 
 use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
 
-use super::super::entry::ConeEntry;
+use super::super::entry::{ConeEntry, luminance};
 use super::super::lights::{LIGHT_SET_BITS, LightSet};
 use super::super::moment::{MomentCone, MomentEntry};
 use super::bits::{BitReader, BitWriter};
@@ -18,24 +18,28 @@ const ANGLE_STEPS: f32 = 4095.0;
 /// Steps of the square root of the mean cosine.
 const COSINE_STEPS: f32 = 4095.0;
 
+/// Steps of the part of a light that is seen; 0 is not known.
+const SEEN_STEPS: f32 = 4095.0;
+
 const SAMPLES_BITS: u32 = 12;
 const COUNT_BITS: u32 = 3;
 /// The rest of the header.
 const TAKEN_BITS: u32 = 32 - SAMPLES_BITS - COUNT_BITS;
 
-/// An entry of up to `CONES` cones in 4 + 16 · `CONES` bytes. A cone is an octahedral direction in 2 × 13 bits (within 6e-4 rad),
+/// An entry of up to `CONES` cones in 4 + 17 · `CONES` bytes. A cone is an octahedral direction in 2 × 13 bits (within 6e-4 rad),
 /// the square root of the opening angle a in 12 (a within √(π a) / 4095 and 1e-6, so narrow cones stay as they are),
-/// the energy as 3 × [`energy_to_bits`], the lights in 20, the root of the mean cosine in 12 (within 2⁻¹²). Moment and fluence follow from these. C is in 12 bits, samples taken
+/// the energy as 3 × [`energy_to_bits`], the lights in 20, the root of the mean cosine in 12 (within 2⁻¹²),
+/// the part of its light that is seen in 12 (within 2⁻¹², but above 0), 0 where that is not known. Moment and fluence follow from these. C is in 12 bits, samples taken
 /// are modulo 2¹⁷.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PackedMoment<const CONES: usize> {
     header: [u8; 4],
-    cones: [[u8; 16]; CONES],
+    cones: [[u8; 17]; CONES],
 }
 
 impl<const CONES: usize> Default for PackedMoment<CONES> {
     fn default() -> Self {
-        PackedMoment { header: [0; 4], cones: [[0; 16]; CONES] }
+        PackedMoment { header: [0; 4], cones: [[0; 17]; CONES] }
     }
 }
 
@@ -73,18 +77,18 @@ impl<const CONES: usize> PackedMoment<CONES> {
     }
 
     /// Header and cones.
-    pub fn to_parts(&self) -> ([u8; 4], [[u8; 16]; CONES]) {
+    pub fn to_parts(&self) -> ([u8; 4], [[u8; 17]; CONES]) {
         (self.header, self.cones)
     }
 
     /// From [`PackedMoment::to_parts`]. Any bytes will do.
-    pub fn from_parts(header: [u8; 4], cones: [[u8; 16]; CONES]) -> PackedMoment<CONES> {
+    pub fn from_parts(header: [u8; 4], cones: [[u8; 17]; CONES]) -> PackedMoment<CONES> {
         PackedMoment { header, cones }
     }
 }
 
-fn pack_cone(cone: &MomentCone) -> [u8; 16] {
-    let mut bytes = [0; 16];
+fn pack_cone(cone: &MomentCone) -> [u8; 17] {
+    let mut bytes = [0; 17];
     let mut writer = BitWriter::new(&mut bytes);
     for component in flatten(cone.direction()).to_array() {
         writer.put(((component.clamp(-1.0, 1.0) + 1.0) * DIRECTION_STEPS).round() as u32, 13);
@@ -95,10 +99,12 @@ fn pack_cone(cone: &MomentCone) -> [u8; 16] {
     }
     writer.put(cone.lights.bits(), LIGHT_SET_BITS as usize);
     writer.put((cone.mean_cosine().sqrt() * COSINE_STEPS).round() as u32, 12);
+    let seen = if cone.seen > 0.0 { (cone.seen * SEEN_STEPS).round().clamp(1.0, SEEN_STEPS) } else { 0.0 };
+    writer.put(seen as u32, 12);
     bytes
 }
 
-fn unpack_cone(bytes: &[u8; 16]) -> MomentCone {
+fn unpack_cone(bytes: &[u8; 17]) -> MomentCone {
     let mut reader = BitReader::new(bytes);
     let place = [0; 2].map(|_| (reader.take(13) as f32 / DIRECTION_STEPS - 1.0).min(1.0));
     let root = reader.take(12) as f32 / ANGLE_STEPS;
@@ -106,7 +112,10 @@ fn unpack_cone(bytes: &[u8; 16]) -> MomentCone {
     let lights = LightSet::from_bits(reader.take(LIGHT_SET_BITS as usize));
     let cosine = reader.take(12) as f32 / COSINE_STEPS;
     let direction = unflatten(Vec2::from_array(place));
-    MomentCone::from_cap(direction, libm::cosf(PI * root * root), energy, cosine * cosine, lights)
+    let seen = reader.take(12) as f32 / SEEN_STEPS;
+    let cone = MomentCone::from_cap(direction, libm::cosf(PI * root * root), energy, cosine * cosine, lights);
+    let hidden = if seen > 0.0 { luminance(energy) * (1.0 / seen - 1.0) } else { 0.0 };
+    MomentCone { hidden, seen, ..cone }
 }
 
 impl<const CONES: usize> ConeEntry for PackedMoment<CONES> {

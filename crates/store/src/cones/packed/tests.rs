@@ -32,7 +32,7 @@ fn assert_energy(back: Vec3, energy: Vec3) {
 #[test]
 fn sizes_are_as_promised() {
     assert_eq!((PAPER_BITS, size_of::<PackedPaper>()), (286, 36));
-    assert_eq!((size_of::<PackedMoment<3>>(), size_of::<PackedMoment<4>>()), (52, 68));
+    assert_eq!((size_of::<PackedMoment<3>>(), size_of::<PackedMoment<4>>()), (55, 72));
     // The two bits beyond stay free.
     let cones = [BoundingCone { direction: -Vec3::Y, angle: PI, energy: Vec3::splat(1e30) }; 3];
     let full = PackedPaper::pack(&BoundingEntry::from_parts(&cones, 255, 0), Vec3::Z).unwrap();
@@ -93,13 +93,10 @@ fn our_entry_is_within_its_bounds() {
                 let u = uniform(seed, i, 2);
                 let lights = LightSet::from_bits((uniform(seed, i, 3) * 1e6) as u32);
                 // Narrow ones most.
-                MomentCone::from_cap(
-                    direction(seed, i),
-                    libm::cosf(3.0 * u * u),
-                    energy(seed, i),
-                    0.01 + 0.99 * u,
-                    lights,
-                )
+                let (cos_angle, cosine) = (libm::cosf(3.0 * u * u), 0.01 + 0.99 * u);
+                let cone =
+                    MomentCone::from_cap(direction(seed, i), cos_angle, energy(seed, i), cosine, lights);
+                MomentCone { seen: [0.0, 1.0, 0.3 * u + 0.1][i as usize % 3], ..cone }
             })
             .collect();
         let samples = (uniform(seed, 51, 0) * 4096.0) as u16;
@@ -115,6 +112,9 @@ fn our_entry_is_within_its_bounds() {
             assert!(error <= (PI * a).sqrt() / 4095.0 + 1e-6 + rounding, "{a} is off by {error}");
             assert_eq!(back.lights, cone.lights);
             assert_energy(back.energy, cone.energy);
+            assert!((back.seen - cone.seen).abs() < 0.5001 / 4095.0);
+            let all = luminance(back.energy) + back.hidden;
+            assert!(cone.seen == 0.0 || (luminance(back.energy) / all - back.seen).abs() < 1e-5);
         }
         assert_eq!(PackedMoment::<3>::pack(&entry).is_none(), count > 3);
     }
@@ -178,7 +178,7 @@ proptest! {
     fn any_bits_are_an_entry(
         paper in prop::collection::vec(any::<u8>(), 36),
         header: [u8; 4],
-        cones in prop::array::uniform4(prop::array::uniform16(any::<u8>())),
+        cones in prop::array::uniform4(prop::array::uniform17(any::<u8>())),
         normal in any::<u32>(),
     ) {
         let normal = direction(normal, 0);

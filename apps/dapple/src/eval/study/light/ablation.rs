@@ -8,12 +8,12 @@ use dapple_scene::glam::Vec3;
 use dapple_server::cones::Now;
 use dapple_store::cones::{BoundingParams, LookUp, MomentParams};
 use dapple_trace::Tracer;
-use dapple_trace::slc::{PaperParams, SlcParams};
+use dapple_trace::slc::PaperParams;
 use serde::Deserialize;
 
 use super::super::{Findings, Study, StudyPlot, StudyTable, Subject, axis, column, line, row};
 use super::{Lit, Quality, Run};
-use crate::direct_light::{STEPS_HZ, Sampler, Seen, Technique, charts, truth};
+use crate::direct_light::{OurCones, STEPS_HZ, Sampler, Seen, Technique, charts, truth};
 use crate::eval::stage::Stage;
 
 #[derive(Debug, Deserialize)]
@@ -36,10 +36,8 @@ impl Default for LightAblation {
     }
 }
 
-fn ours(change: impl FnOnce(&mut SlcParams, &mut LookUp, &mut Samples)) -> Technique {
-    let (mut params, mut look_up, mut samples) = (SlcParams::default(), LookUp::default(), Samples::Adaptive);
-    change(&mut params, &mut look_up, &mut samples);
-    Technique::Cones { params, look_up, samples }
+fn ours(change: impl FnOnce(&mut OurCones)) -> Technique {
+    Technique::cones().changed(change)
 }
 
 fn papers(change: impl FnOnce(&mut PaperParams, &mut LookUp)) -> Technique {
@@ -52,24 +50,27 @@ fn variants() -> Vec<(String, Technique)> {
     let mut all = vec![("slc".to_owned(), Technique::cones())];
     for cones in [1, 2, 4] {
         let moment = MomentParams { cones, ..MomentParams::default() };
-        all.push((format!("slc, {cones} cones"), ours(|p, _, _| p.moment = moment)));
+        all.push((format!("slc, {cones} cones"), ours(|c| c.params.moment = moment)));
     }
     for inside in [1.0, 1.3, 2.0] {
         let moment = MomentParams { inside, ..MomentParams::default() };
-        all.push((format!("slc, inside {inside}"), ours(|p, _, _| p.moment = moment)));
+        all.push((format!("slc, inside {inside}"), ours(|c| c.params.moment = moment)));
     }
+    all.push(("slc by cones alone".to_owned(), ours(|c| c.shapes = false)));
     let untagged = MomentParams { tagged: false, ..MomentParams::default() };
-    all.push(("slc, without tags".to_owned(), ours(|p, _, _| p.moment = untagged)));
+    all.push(("slc, without tags".to_owned(), ours(|c| c.params.moment = untagged)));
     all.push(("slc, power sampler".to_owned(), Technique::cones().with_sampler(Sampler::Power)));
     for bias in [0.5, 2.0, 4.0, 8.0] {
-        all.push((format!("slc, bias {bias}"), ours(|_, l, _| l.bias = bias)));
+        all.push((format!("slc, bias {bias}"), Technique::cones().with_texels(bias)));
     }
     for bias in [1.0, 2.0, 4.0] {
         let look_up = LookUp { bias, blend: false };
-        all.push((format!("slc, one texel, bias {bias}"), ours(|_, l, _| *l = look_up)));
+        all.push((format!("slc, one texel, bias {bias}"), ours(|c| c.shading.look_up = look_up)));
     }
     for samples in [1, 4, 8, 16, 64] {
-        all.push((format!("slc, {samples} directions"), ours(|_, _, s| *s = Samples::Fixed(samples))));
+        let fixed = Samples::Fixed(samples);
+        let cones = |c: &mut OurCones| (c.shading.samples, c.shapes) = (fixed, false);
+        all.push((format!("slc by cones alone, {samples} directions"), ours(cones)));
     }
     for cones in [1, 2, 3, 8] {
         let bounding = BoundingParams { cones, ..BoundingParams::default() };
@@ -83,8 +84,8 @@ fn variants() -> Vec<(String, Technique)> {
 }
 
 /// Variants whose way is plotted.
-const PLOTTED: [&str; 4] =
-    ["slc", "slc, power sampler", "slc-paper, 3 cones", "slc-paper, nothing discarded"];
+const PLOTTED: [&str; 5] =
+    ["slc", "slc by cones alone", "slc, power sampler", "slc-paper, 3 cones", "slc-paper, nothing discarded"];
 
 impl LightAblation {
     fn still(&self, lit: &Lit<'_>, subject: &Subject<'_>) -> Result<(StudyTable, StudyPlot)> {
@@ -195,7 +196,7 @@ impl LightAblation {
             let techniques = [
                 ("rt-48", Technique::rays(48, Sampler::Power)),
                 ("slc-paper", Technique::paper_cones(Sampler::Power)),
-                ("slc without re-aiming", ours(|p, _, _| p.re_aim = false)),
+                ("slc without re-aiming", ours(|c| c.params.re_aim = false)),
                 ("slc", Technique::cones()),
             ];
             let mut runs = techniques.into_iter().map(|(n, t)| Run::new(n, t)).collect::<Result<Vec<_>>>()?;

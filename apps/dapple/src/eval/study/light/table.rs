@@ -41,7 +41,9 @@ fn techniques() -> Vec<(&'static str, Technique)> {
         ("slc-paper", Technique::paper_cones(power)),
         ("slc-paper, best sampler", Technique::paper_cones(best)),
         ("slc, power", Technique::cones().with_sampler(power)),
+        ("slc by cones alone", Technique::cones().changed(|cones| cones.shapes = false)),
         ("slc, one texel", Technique::cones().without_blending()),
+        ("slc, texels twice as wide", Technique::cones().with_texels(2.0)),
         ("slc", Technique::cones()),
     ]
 }

@@ -94,6 +94,7 @@ fn techniques() -> Vec<(&'static str, Technique)> {
         ("rt-48", Technique::rays(48, Sampler::Power)),
         ("restir-di", Technique::Restir { sampler: Sampler::Power, unbiased: false }),
         ("slc-paper", Technique::paper_cones(Sampler::Power)),
+        ("slc, texels twice as wide", Technique::cones().with_texels(2.0)),
         ("slc", Technique::cones()),
     ]
 }

@@ -1,0 +1,199 @@
+//! One sample's light: of the entries about it, by the shapes of lights that they see and by cones of the rest.
+
+use dapple_scene::ShadingPoint;
+use dapple_store::cones::{ConeEntry, EntryId, EntrySite, PixelPlace, Reader, luminance};
+use glam::Vec3;
+
+use super::cap::{Cap, Ground, Lanes, Lens};
+use super::{Blending, Caps, ConeLight, SeenPart, SlcShading};
+use crate::area_lights::{Arrival, ROUGH_ALPHA, Surface};
+
+/// Part of a light from which on it is shown whole: an error of that much in its brightness is not seen, and its form then is its own.
+const WHOLE: f32 = 0.97;
+
+/// Most entries that a sample reads.
+const ENTRIES: usize = 4;
+
+/// Most cones of those.
+const PARTS: usize = 16;
+
+/// Reads and shades, for one task.
+pub(super) struct Blender<'a, E, F> {
+    light: &'a ConeLight<'a, E, F>,
+    shading: &'a SlcShading,
+    reader: Reader<'a, E>,
+    lanes: Lanes,
+}
+
+/// An entry that a sample reads.
+struct Read<'a, E> {
+    entry: &'a E,
+    ground: Ground,
+    weight: f32,
+}
+
+impl<E> Clone for Read<'_, E> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<E> Copy for Read<'_, E> {}
+
+/// What several entries see of one light, each by its weight.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    slot: usize,
+    fraction: f32,
+    /// Of cones: their fluence, and that × direction.
+    fluence: f32,
+    moment: Vec3,
+}
+
+impl<'a, E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite>> Blender<'a, E, F> {
+    pub(super) fn new(light: &'a ConeLight<'a, E, F>, shading: &'a SlcShading) -> Self {
+        Blender { light, shading, reader: Reader::new(light.cache, shading.look_up), lanes: Lanes::new() }
+    }
+
+    /// Radiance that a sample reflects towards the viewer.
+    pub(super) fn reflect(&mut self, point: &ShadingPoint, pixel: &PixelPlace) -> Vec3 {
+        let mut reads = [None; ENTRIES];
+        let count = self.read(point, pixel, &mut reads);
+        let mut lens = Lens::of(point, self.shading, &mut self.lanes);
+        let mut parts = [Seen::default(); PARTS];
+        let mut used = 0;
+        let mut mean = Vec3::ZERO;
+        let mut heaviest: Option<(f32, Vec3, &Read<'_, E>)> = None;
+        let each_apart = self.shading.blending == Blending::Cones || count == 1;
+        let widest = widest_part(point);
+        let slot_of = |cap: &Cap, seen: Option<SeenPart>| {
+            let seen = seen.filter(|seen| seen.of_all >= WHOLE || 1.0 - cap.cos_angle <= widest)?;
+            Some((self.light.lights?.slot_of_form(seen.light)?, seen.fraction))
+        };
+        for read in reads[..count].iter().flatten() {
+            let mut irradiance = Vec3::ZERO;
+            read.entry.each_cap(|cap, seen| {
+                if let Some((slot, fraction)) = slot_of(&cap, seen) {
+                    let at = parts[..used].iter().position(|part| part.slot == slot).unwrap_or(used);
+                    // A sample reads no more cones than there are places.
+                    let Some(part) = parts.get_mut(at) else { return };
+                    used = used.max(at + 1);
+                    part.slot = slot;
+                    part.add(&cap, fraction, read.weight);
+                } else if each_apart {
+                    lens.add(&cap, &read.ground, read.weight);
+                } else {
+                    irradiance += cap.irradiance(point.normal_shading_world);
+                }
+            });
+            let part = read.weight * luminance(irradiance);
+            mean += irradiance * read.weight;
+            if part > 0.0 && heaviest.is_none_or(|(most, ..)| part > most) {
+                heaviest = Some((part, irradiance, read));
+            }
+        }
+        let mut radiance = Vec3::ZERO;
+        if let Some((_, irradiance, read)) = heaviest {
+            read.entry.each_cap(|cap, seen| {
+                if slot_of(&cap, seen).is_none() {
+                    lens.add(&cap, &read.ground, 1.0);
+                }
+            });
+            // Not more than four times of what the heaviest of four has, in any colour.
+            radiance = lens.radiance()
+                * (mean / irradiance.max(Vec3::splat(f32::MIN_POSITIVE))).min(Vec3::splat(4.0));
+        } else if each_apart {
+            radiance = lens.radiance();
+        }
+        if used > 0
+            && let Some(table) = self.light.lights
+        {
+            let surface = Surface::of(point);
+            for part in &parts[..used] {
+                let arrival = table.arrival(part.slot, point.position_world, point.normal_shading_world);
+                let Some(arrival) = arrival else { continue };
+                radiance += surface.reflect(&part.cone(&arrival)) * part.fraction;
+            }
+        }
+        radiance
+    }
+
+    /// Entries about a sample, the like of it first of all; how many.
+    fn read(
+        &mut self,
+        point: &ShadingPoint,
+        pixel: &PixelPlace,
+        reads: &mut [Option<Read<'a, E>>; ENTRIES],
+    ) -> usize {
+        let found = self.reader.read(pixel);
+        let texel_m = (pixel.footprint_m * self.shading.look_up.bias).max(f32::MIN_POSITIVE);
+        let mut count = 0;
+        let mut plain = [0.0; ENTRIES];
+        let (mut total, mut plain_total) = (0.0, 0.0);
+        for &(id, weight) in found.entries() {
+            let Some(site) = (self.light.place_of)(id) else { continue };
+            let Some(entry) = self.light.cache.entry(id) else { continue };
+            // Entries on other faces, or off the plane, see other light.
+            let facing = fourth(point.normal_world.dot(site.normal_world).max(0.0));
+            let leaning = fourth(point.normal_shading_world.dot(site.normal_shading_world).max(0.0));
+            let off = point.normal_world.dot(site.position_world - point.position_world) / texel_m;
+            let near = weight * (facing * facing) * leaning / (1.0 + off * off);
+            let ground = Ground { normal: site.normal_world, normal_shading: site.normal_shading_world };
+            reads[count] = Some(Read { entry, ground, weight: near });
+            plain[count] = weight;
+            total += near;
+            plain_total += weight;
+            count += 1;
+        }
+        let mut kept = 0;
+        for i in 0..count {
+            let Some(mut read) = reads[i] else { continue };
+            // Where none is like the place, any is better than darkness.
+            read.weight =
+                if total > 1e-4 * plain_total { read.weight / total } else { plain[i] / plain_total };
+            if read.weight > 1e-3 {
+                reads[kept] = Some(read);
+                kept += 1;
+            }
+        }
+        kept
+    }
+}
+
+impl Seen {
+    fn add(&mut self, cap: &Cap, fraction: f32, weight: f32) {
+        self.fraction += weight * fraction;
+        // Entries that see little of the light tell little of where that lies.
+        let fluence = weight * luminance(cap.energy) / cap.mean_cosine;
+        self.fluence += fluence;
+        self.moment += cap.direction * (fluence * 0.5 * (1.0 + cap.cos_angle));
+    }
+
+    /// The cone of what is seen of a light that would arrive like this, with the irradiance of all of it.
+    fn cone(&self, arrival: &Arrival) -> Arrival {
+        match self.moment.try_normalize() {
+            Some(direction) if self.fraction < WHOLE => {
+                let cos_angle = (2.0 * self.moment.length() / self.fluence - 1.0).clamp(-1.0, 1.0);
+                Arrival { direction, cos_angle, ..*arrival }
+            }
+            _ => *arrival,
+        }
+    }
+}
+
+/// 1 − cos a of the widest cone of a part of a light that one cone for all entries about a sample stands for. On smooth surfaces it is seen of wide
+/// ones that each entry sees another part, which several cones may be.
+fn widest_part(point: &ShadingPoint) -> f32 {
+    let alpha = point.reflectance.alpha;
+    if alpha >= ROUGH_ALPHA || !point.reflectance.specular {
+        return f32::INFINITY;
+    }
+    // As wide as the lobe, about.
+    let chord = 1.2 * (0.04 + 0.6 * alpha);
+    0.5 * chord * chord
+}
+
+fn fourth(v: f32) -> f32 {
+    let v2 = v * v;
+    v2 * v2
+}
