@@ -1,21 +1,21 @@
 //! One sample's light: of the entries about it, by the shapes of lights that they see and by cones of the rest.
 
 use dapple_scene::ShadingPoint;
-use dapple_store::cones::{ConeEntry, EntryId, EntrySite, PixelPlace, Reader, luminance};
+use dapple_store::cones::{ConeEntry, EntryId, EntrySite, MOST_MOMENT_CONES, PixelPlace, Reader, luminance};
 use glam::Vec3;
 
 use super::cap::{Cap, Ground, Lanes, Lens};
 use super::{Blending, Caps, ConeLight, SeenPart, SlcShading};
 use crate::area_lights::{Arrival, ROUGH_ALPHA, Surface};
 
-/// Part of a light from which on it is shown whole: an error of that much in its brightness is not seen, and its form then is its own.
+/// Part of a light from which on its highlight is that of all of it: nothing is seen of what lacks.
 const WHOLE: f32 = 0.97;
 
 /// Most entries that a sample reads.
 const ENTRIES: usize = 4;
 
 /// Most cones of those.
-const PARTS: usize = 16;
+const PARTS: usize = ENTRIES * MOST_MOMENT_CONES;
 
 /// Reads and shades, for one task.
 pub(super) struct Blender<'a, E, F> {
@@ -45,6 +45,9 @@ impl<E> Copy for Read<'_, E> {}
 struct Seen {
     slot: usize,
     fraction: f32,
+    /// Weight of entries that tell, and the last that did.
+    told: f32,
+    teller: usize,
     /// Of cones: their fluence, and that × direction.
     fluence: f32,
     moment: Vec3,
@@ -70,7 +73,7 @@ impl<'a, E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite>> Blender<'a, E
             let seen = seen.filter(|seen| seen.of_all >= WHOLE || 1.0 - cap.cos_angle <= widest)?;
             Some((self.light.lights?.slot_of_form(seen.light)?, seen.fraction))
         };
-        for read in reads[..count].iter().flatten() {
+        for (teller, read) in (1..).zip(reads[..count].iter().flatten()) {
             let mut irradiance = Vec3::ZERO;
             read.entry.each_cap(|cap, seen| {
                 if let Some((slot, fraction)) = slot_of(&cap, seen) {
@@ -80,6 +83,9 @@ impl<'a, E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite>> Blender<'a, E
                     used = used.max(at + 1);
                     part.slot = slot;
                     part.add(&cap, fraction, read.weight);
+                    if part.teller != teller {
+                        (part.teller, part.told) = (teller, part.told + read.weight);
+                    }
                 } else if each_apart {
                     lens.add(&cap, &read.ground, read.weight);
                 } else {
@@ -172,7 +178,7 @@ impl Seen {
     /// The cone of what is seen of a light that would arrive like this, with the irradiance of all of it.
     fn cone(&self, arrival: &Arrival) -> Arrival {
         match self.moment.try_normalize() {
-            Some(direction) if self.fraction < WHOLE => {
+            Some(direction) if self.fraction < WHOLE * self.told => {
                 let cos_angle = (2.0 * self.moment.length() / self.fluence - 1.0).clamp(-1.0, 1.0);
                 Arrival { direction, cos_angle, ..*arrival }
             }

@@ -135,7 +135,10 @@ impl Update for MomentEntry {
                 // What it knows is of a place beside it.
                 ConeEntry::cut_confidence(entry, KEPT as u16);
             }
-            let mut count = quiet_samples(entry, params, frame.wrapping_add(site as u32));
+            let turn = turn_of(texel.id);
+            // When it is its turn in any case.
+            let phase = frame.wrapping_add(turn).wrapping_add((site as u32) << 1);
+            let mut count = quiet_samples(entry, params, phase);
             if change.share > LEAST_SHARE {
                 changed.fetch_add(1, Ordering::Relaxed);
                 let root = change.share.sqrt();
@@ -146,7 +149,8 @@ impl Update for MomentEntry {
                 // Of a light that was not there, what the entry knows says nothing.
                 let kept = if change.new > LEAST_SHARE { kept.min(1.0 / change.new) } else { kept / root };
                 entry.cut_confidence(kept.clamp(1.0, 4095.0) as u16);
-                if change.new <= LEAST_SHARE && is_plain(entry) && !is_turn(texel.id, frame) {
+                let follows = params.re_aim && change.new <= LEAST_SHARE && !texel.moved && !texel.is_new;
+                if follows && is_plain(entry) && !turn.wrapping_add(frame).is_multiple_of(2) {
                     return false;
                 }
                 count = count.max(libm::ceilf(params.first_samples as f32 * root) as u32);
@@ -178,11 +182,10 @@ fn is_plain(entry: &MomentEntry) -> bool {
         && entry.cones().iter().all(|cone| entry.seen_of(cone.lights) >= ALL_SEEN)
 }
 
-/// Whether it is an entry's turn, of two frames in one: its neighbours' is in the other, and pixels blend both.
-fn is_turn(id: EntryId, frame: u32) -> bool {
+/// Of two frames in one it is an entry's turn; its neighbours' is in the other, in a checkerboard, so that pixels that blend entries have both.
+fn turn_of(id: EntryId) -> u32 {
     let side = BLOCK_SIDE as usize;
-    let (x, y) = (id.index() % side, id.index() / side);
-    (x + y + frame as usize).is_multiple_of(2)
+    (id.index() % side + id.index() / side % side) as u32
 }
 
 /// Samples of an entry about which nothing changed. Rays from one place together are quicker than apart, so a grown entry takes several in
@@ -250,14 +253,21 @@ fn take_samples(
     chooser.aim(lights, origin, faced);
     let mut samples = Vec::with_capacity(indices.len());
     let mut reaches: Vec<Vec3> = Vec::with_capacity(indices.len());
+    let mut hidden = Vec::new();
     for i in indices {
         let Some(sample) = lights.sample(&chooser, origin, draws.at(i)) else {
             continue;
         };
         let cosine = faced.dot(sample.to_light_world);
-        if cosine > 0.0 && normal.dot(sample.to_light_world) > 0.0 {
-            let factor = if source.with_cosine { cosine } else { 1.0 };
-            let value = sample.radiance * (factor / sample.density_per_sr);
+        if cosine <= 0.0 {
+            continue;
+        }
+        let factor = if source.with_cosine { cosine } else { 1.0 };
+        let value = sample.radiance * (factor / sample.density_per_sr);
+        if normal.dot(sample.to_light_world) <= 0.0 {
+            // The surface itself is in the way of its bumps.
+            hidden.push(HiddenSample { light: sample.light, value: luminance(value) });
+        } else {
             samples.push(ConeSample {
                 direction: sample.to_light_world,
                 value,
@@ -269,7 +279,6 @@ fn take_samples(
     }
     let blocked = tracer.occlusion(origin, &reaches, 1.0);
     let mut i = 0;
-    let mut hidden = Vec::new();
     samples.retain(|sample| {
         i += 1;
         let is_hidden = blocked[(i - 1) / 64] >> ((i - 1) % 64) & 1 == 1;

@@ -68,20 +68,22 @@ impl MomentEntry {
             }
             self.remove(i);
             let direction = cone.direction();
+            // Of its own light, if there is one: what is seen of the other's would look like more.
+            let away = |other: &MomentCone| {
+                angle_between(other.direction(), direction)
+                    + if other.lights == cone.lights { 0.0 } else { 4.0 }
+            };
             let heir = self
                 .cones()
                 .iter()
                 .enumerate()
-                .map(|(k, other)| (angle_between(other.direction(), direction), k))
+                .map(|(k, other)| (away(other), k))
                 .fold((f32::INFINITY, 0), |best, next| if next.0 < best.0 { next } else { best });
             let heir = &mut self.cones[heir.1];
             let before = heir.fluence;
             heir.energy += cone.energy;
             heir.fluence += cone.fluence;
             heir.moment *= heir.fluence / before;
-            if heir.lights == cone.lights {
-                heir.hidden += cone.hidden;
-            }
         }
     }
 
@@ -99,9 +101,17 @@ impl MomentEntry {
         self.count += 1;
     }
 
-    /// Takes a cone out; the others keep their order.
+    /// Takes a cone out; the others keep their order. What was hidden of its light stays with another cone of that.
     fn remove(&mut self, at: usize) {
         let count = usize::from(self.count);
+        let gone = self.cones[at];
+        let mut others = self.cones[..count]
+            .iter_mut()
+            .enumerate()
+            .filter(|(k, other)| *k != at && other.lights == gone.lights);
+        if let Some((_, other)) = others.next() {
+            other.hidden += gone.hidden;
+        }
         self.cones.copy_within(at + 1..count, at);
         self.cones[count - 1] = MomentCone::default();
         self.count -= 1;
@@ -123,7 +133,7 @@ impl MomentEntry {
 
     fn merge_closest(&mut self, params: &MomentParams) {
         if let Some((_, i, k)) = self.closest_pair(params) {
-            let other = self.cones[k];
+            let other = std::mem::take(&mut self.cones[k]);
             self.cones[i].absorb(&other);
             self.remove(k);
         }

@@ -23,6 +23,9 @@ const LEAST_COSINE: f32 = 1.0 / 4096.0;
 /// Samples of a light that an entry should stand for before it tells how much of the light is seen.
 const LEAST_TAKEN: f32 = 1.0;
 
+/// Samples of a light that an entry should stand for before it is believed that all were hidden of which none was seen: fewer may have been none.
+const LEAST_HIDDEN: f32 = 4.0;
+
 /// How moment cones are kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MomentParams {
@@ -307,11 +310,18 @@ impl MomentEntry {
             let of_light = hidden.iter().filter(|sample| sample.light == light && sample.value.is_finite());
             let now = of_light.map(|sample| sample.value.clamp(0.0, MOST_ENERGY)).sum::<f32>() * weight;
             self.cones[i].hidden += now;
-            if !before.contains(&lights) {
-                // Until now nothing of it was seen: the samples before were all hidden, and worth what these are.
-                let seen: f32 =
-                    self.cones().iter().filter(|c| c.lights == lights).map(|c| luminance(c.energy)).sum();
-                self.cones[i].hidden += (seen + now) * f32::from(self.samples) / drawn as f32;
+            let likely = picked(light) * f32::from(self.samples);
+            if likely >= LEAST_HIDDEN && !before.iter().any(|lights| lights.may_hold(light)) {
+                // Some of the samples before were of it, and none was seen: all were hidden, and worth what these are.
+                let mine = |of: u32| u32::from(of == light);
+                let seen = samples
+                    .iter()
+                    .filter(|s| s.light == light)
+                    .map(|s| luminance(s.value))
+                    .filter(|v| v.is_finite());
+                let seen: f32 = seen.map(|value| value.clamp(0.0, MOST_ENERGY)).sum::<f32>() * weight;
+                let count = samples.iter().map(|s| mine(s.light)).chain(hidden.iter().map(|s| mine(s.light)));
+                self.cones[i].hidden += likely * (seen + now) / count.sum::<u32>().max(1) as f32;
             }
         }
         let most = u32::from(params.max_samples.max(1));

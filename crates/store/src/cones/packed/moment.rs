@@ -29,7 +29,7 @@ const TAKEN_BITS: u32 = 32 - SAMPLES_BITS - COUNT_BITS;
 /// An entry of up to `CONES` cones in 4 + 17 · `CONES` bytes. A cone is an octahedral direction in 2 × 13 bits (within 6e-4 rad),
 /// the square root of the opening angle a in 12 (a within √(π a) / 4095 and 1e-6, so narrow cones stay as they are),
 /// the energy as 3 × [`energy_to_bits`], the lights in 20, the root of the mean cosine in 12 (within 2⁻¹²),
-/// the part of its light that is seen in 12 (within 2⁻¹², but above 0), 0 where that is not known. Moment and fluence follow from these. C is in 12 bits, samples taken
+/// the part of its light that is seen in 12 (within 2⁻¹², but above 0), 0 where that is not known. Moment, fluence and, where that part is known, what is hidden follow from these. C is in 12 bits, samples taken
 /// are modulo 2¹⁷.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PackedMoment<const CONES: usize> {
@@ -69,11 +69,17 @@ impl<const CONES: usize> PackedMoment<CONES> {
         for (to, bytes) in cones.iter_mut().zip(&self.cones) {
             *to = unpack_cone(bytes);
         }
-        MomentEntry::from_parts(
-            &cones[..count.min(CONES)],
-            self.confidence(),
-            header >> (SAMPLES_BITS + COUNT_BITS),
-        )
+        let cones = &mut cones[..count.min(CONES)];
+        for i in 0..cones.len() {
+            let lights = cones[i].lights;
+            let of_light = cones.iter().filter(|cone| cone.lights == lights);
+            let (all, seen) = of_light.fold((0.0, 0.0), |(e, s), c| (e + luminance(c.energy), s + c.seen));
+            // Of several cones of a light, the first keeps what was hidden of it.
+            if seen > 0.0 && cones[..i].iter().all(|cone| cone.lights != lights) {
+                cones[i].hidden = (all / seen - all).max(0.0);
+            }
+        }
+        MomentEntry::from_parts(cones, self.confidence(), header >> (SAMPLES_BITS + COUNT_BITS))
     }
 
     /// Header and cones.
@@ -114,8 +120,7 @@ fn unpack_cone(bytes: &[u8; 17]) -> MomentCone {
     let direction = unflatten(Vec2::from_array(place));
     let seen = reader.take(12) as f32 / SEEN_STEPS;
     let cone = MomentCone::from_cap(direction, libm::cosf(PI * root * root), energy, cosine * cosine, lights);
-    let hidden = if seen > 0.0 { luminance(energy) * (1.0 / seen - 1.0) } else { 0.0 };
-    MomentCone { hidden, seen, ..cone }
+    MomentCone { seen, ..cone }
 }
 
 impl<const CONES: usize> ConeEntry for PackedMoment<CONES> {
