@@ -58,6 +58,8 @@ pub struct ConeServer<E> {
     queue: UpdateQueue,
     places: EntryPlaces,
     before: Option<Pose>,
+    /// Steps since something changed.
+    quiet: u32,
 }
 
 /// What a step did.
@@ -110,6 +112,7 @@ impl<E: Update> ConeServer<E> {
             queue: UpdateQueue::default(),
             places: EntryPlaces::default(),
             before: None,
+            quiet: u32::MAX,
         })
     }
 
@@ -130,7 +133,9 @@ impl<E: Update> ConeServer<E> {
         pass("places");
         let (lights, lights_before) = (now.lights(now.pose), now.lights(before));
         let then = Moment { scene: now.scene, pose: before, lights: &lights_before };
-        let changes = Changes::between(&then, &Moment { pose: now.pose, lights: &lights, ..then });
+        let now_there = Moment { pose: now.pose, lights: &lights, ..then };
+        let changes = Changes::between(&then, &now_there).after_quiet(self.quiet);
+        self.quiet = if changes.is_nothing() { self.quiet.saturating_add(1) } else { 0 };
         let counts =
             E::update_queue(&mut self.cache, &self.queue, &self.places, now.tracer, &changes, params);
         pass("rays");

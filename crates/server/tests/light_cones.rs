@@ -209,6 +209,37 @@ fn lights_that_move_are_shaded_by_their_shapes() {
     assert!(shapes[0] > 28.0 && shapes[2].abs() < 1.5, "{shapes:?}");
 }
 
+/// Lights move while nobody looks, and then stand: what was settled before is learnt anew.
+#[test]
+fn what_changed_out_of_sight_is_learnt_when_it_comes_back() {
+    let stage = Stage::new("street", 0.1, [64, 36]);
+    let mut there = Crowd::new(SlcShading::default(), false);
+    let mut fresh = Crowd::new(SlcShading::default(), false);
+    let mut tracer = Tracer::new(&stage.scene, &stage.scene.pose(0.0));
+    // Long enough to be as good as it gets, and to take no more rays.
+    let moments = (0..300).map(|_| (2.0, true)).chain((1..20).map(|i| (2.0 + f64::from(i) / 5.0, false)));
+    let camera = stage.scene.camera_paths()[0].camera(&stage.scene, &stage.scene.pose(2.0));
+    for (i, (time_s, looks)) in moments.chain((0..12).map(|_| (5.8, true))).enumerate() {
+        let pose = stage.scene.pose(time_s);
+        tracer.update(&stage.scene, &pose);
+        let now = Now { scene: &stage.scene, pose: &pose, tracer: &tracer, environment: None };
+        let seen: Vec<Seen> = looks.then(|| stage.see_from(&now, camera)).into_iter().collect();
+        there.step(&stage, &now, &seen);
+        if i >= 319 {
+            fresh.step(&stage, &now, &seen);
+        }
+        if i == 330 {
+            let params = DirectParams { samples: 256, seed: 7, ..DirectParams::default() };
+            let truth = rays(&now, &seen[0].points, &params);
+            let [there, fresh] = [&there, &fresh].map(|crowd| stage.quality(&truth, &crowd.pictures[0])[0]);
+            println!("{there:.2} dB, from nothing {fresh:.2} dB");
+            assert!(there > fresh - 1.0 && there > 24.0, "{there} {fresh}");
+            return;
+        }
+    }
+    unreachable!("there are 331 moments");
+}
+
 /// Prints the table of `render/src/slc/README.md`: all entries are settled after 260 steps.
 #[test]
 #[ignore = "measures; minutes"]

@@ -124,7 +124,7 @@ impl<'a, E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite>> Blender<'a, E
         radiance
     }
 
-    /// Entries about a sample, the like of it first of all; how many.
+    /// Entries about a sample whose weight counts, and how many.
     fn read(
         &mut self,
         point: &ShadingPoint,

@@ -7,6 +7,8 @@
 //! No ray is traced: visibility is in the cones. Equations in `README.md`.
 
 mod blend;
+#[cfg(test)]
+mod blend_tests;
 mod cap;
 mod places;
 #[cfg(test)]

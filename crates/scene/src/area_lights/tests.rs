@@ -193,6 +193,9 @@ fn picks_differ_in_noise_alone() {
     let mut chooser = Chooser::new(Pick::Fluence);
     chooser.aim(&lights, Vec3::ZERO, Vec3::Y);
     assert_eq!(chooser.probability(&lights, 3), 0.0);
+    // Of four that can arrive each is picked now and then, however little it would bring.
+    let least = (0..5).filter(|l| *l != 3).map(|l| chooser.probability(&lights, l)).fold(1.0, f32::min);
+    assert!(least > 0.5 / 4.0 - 1e-5, "{least}");
     // A sample is a pick and a place on what was picked.
     for u in cube(500) {
         let (light, probability, rest) = chooser.pick(&lights, u[0]).unwrap();

@@ -29,6 +29,8 @@ pub struct Changes<'a> {
     /// Balls about what casts and moved, where it was and where it is, with the instance.
     movers: Vec<(Vec3, f32, u32)>,
     nothing: bool,
+    /// Frames before this in which nothing changed.
+    quiet: u32,
 }
 
 /// What changed for one entry.
@@ -70,7 +72,19 @@ impl<'a> Changes<'a> {
             }
         }
         let nothing = !lights.contains(&true) && !moved.contains(&true);
-        Changes { now: now.lights, before: before.lights, lights, moved, movers, nothing }
+        Changes { now: now.lights, before: before.lights, lights, moved, movers, nothing, quiet: u32::MAX }
+    }
+
+    /// With how many frames before this one nothing had changed in; [`Changes::between`] takes it that nothing ever had. What nobody saw for
+    /// longer may have missed a change.
+    #[must_use]
+    pub fn after_quiet(self, frames: u32) -> Changes<'a> {
+        Changes { quiet: frames, ..self }
+    }
+
+    /// Frames since the first change, before this one, that an entry may have missed which nobody saw for so many frames; 0 if it missed none.
+    pub(super) fn missed(&self, absent: u32) -> u32 {
+        absent.saturating_sub(self.quiet)
     }
 
     /// The lights as they are now.
@@ -175,19 +189,12 @@ impl Change {
             let now = changes.now.bounds(light).unwrap_or(then);
             let (a, b) = (then.0 - place.position_before_world, now.0 - place.position_world);
             let (Some(from), Some(to)) = (a.try_normalize(), b.try_normalize()) else { continue };
-            let arriving =
-                |lights: &AreaLights<'_>, position, normal| lights.arriving(light, position, normal);
-            let before =
-                arriving(changes.before, place.position_before_world, place.normal_shading_before_world);
-            let after = if gone {
-                0.0
-            } else {
-                arriving(changes.now, place.position_world, place.normal_shading_world)
-            };
-            let fluence = |lights: &AreaLights<'_>, position| arriving(lights, position, Vec3::ZERO);
+            let fluence = |lights: &AreaLights<'_>, position| lights.arriving(light, position, Vec3::ZERO);
             let fluence_before = fluence(changes.before, place.position_before_world);
             let fluence_after = if gone { 0.0 } else { fluence(changes.now, place.position_world) };
-            if before <= 0.0 || fluence_before <= 0.0 || then.1 <= 0.0 {
+            let before = fluence_before * mean_cosine(place.normal_shading_before_world, a, then.1);
+            let after = fluence_after * mean_cosine(place.normal_shading_world, b, now.1);
+            if before <= 0.0 || then.1 <= 0.0 {
                 continue;
             }
             let size_ratio = (now.1 / b.length()) / (then.1 / a.length());
@@ -201,6 +208,21 @@ impl Change {
             });
         }
     }
+}
+
+/// Mean cosine to a normal of light from a ball at an offset: that to its centre while all of it is above the horizon, and from there on falling
+/// to 0 with what is left above.
+fn mean_cosine(normal: Vec3, offset: Vec3, radius: f32) -> f32 {
+    let distance = offset.length();
+    if distance <= radius {
+        return 1.0;
+    }
+    let (cosine, sine) = (normal.dot(offset) / distance, radius / distance);
+    if cosine >= sine {
+        return cosine;
+    }
+    let above = (cosine + sine).max(0.0);
+    above * above / (4.0 * sine.max(f32::MIN_POSITIVE))
 }
 
 /// A ball that holds both.

@@ -135,6 +135,11 @@ impl Update for MomentEntry {
                 // What it knows is of a place beside it.
                 ConeEntry::cut_confidence(entry, KEPT as u16);
             }
+            let missed = changes.missed(texel.absent);
+            if missed > 0 {
+                // What it knows may be of another time.
+                ConeEntry::cut_confidence(entry, (KEPT as u32 / missed) as u16);
+            }
             let turn = turn_of(texel.id);
             // When it is its turn in any case.
             let phase = frame.wrapping_add(turn).wrapping_add((site as u32) << 1);

@@ -269,6 +269,7 @@ fn cones_follow_a_light_that_moves() {
     let rig = Rig::new(vec![lamp]);
     let params = SlcParams::default();
     let mut cache = rig.settled(20, &params);
+    let settled: Vec<u32> = cache.ids().map(|id| cache.entry(id).unwrap().taken()).collect();
     let mut before = rig.pose.clone();
     for step in 1..=30 {
         let mut now = rig.pose.clone();
@@ -278,12 +279,16 @@ fn cones_follow_a_light_that_moves() {
         // It is seen whole: half of the entries take samples, those that do not follow it without.
         assert!((counts.updated * 2).abs_diff(counts.changed) <= counts.changed / 8, "{counts:?}");
         let (d2, cos) = (at.length_squared(), 2.0 / at.length());
-        assert_near(mean(&cache), 10.0 * PI * 0.09 / d2 * cos, 0.04);
+        assert_near(mean(&cache), 10.0 * PI * 0.09 / d2 * cos, 0.03);
         for id in cache.ids() {
             let sum = cache.entry(id).unwrap().cones().iter().fold(Vec3::ZERO, |sum, cone| sum + cone.moment);
             assert!(sum.normalize().dot(at.normalize()) > 0.99, "step {step}: {sum}");
         }
         before = now;
+    }
+    // Every other of 30 steps was every entry's turn.
+    for (id, settled) in cache.ids().zip(settled) {
+        assert_eq!(cache.entry(id).unwrap().taken() - settled, 15 * params.first_samples);
     }
 }
 

@@ -22,6 +22,8 @@ pub struct QueuedTexel {
     pub is_new: bool,
     /// Whether its place became another: until now only pixels beside it had asked for it.
     pub moved: bool,
+    /// Frames before this in which it was there and nobody saw it.
+    pub absent: u32,
 }
 
 /// The texels that viewers see in a frame, each once. The order depends on the requests alone.
@@ -165,7 +167,9 @@ impl<E: ConeEntry> ConeCache<E> {
                 body.updated[texel] = 0;
                 self.heads[slot].note_samples(texel, &body.entries[texel]);
             }
-            let body = &self.bodies[slot];
+            let body = &mut self.bodies[slot];
+            let last = std::mem::replace(&mut body.wanted[texel], self.frame);
+            let absent = if is_new { 0 } else { self.frame.wrapping_sub(last).saturating_sub(1) };
             let age = match body.updated[texel] {
                 0 => u32::MAX,
                 updated => self.frame.wrapping_sub(updated),
@@ -178,6 +182,7 @@ impl<E: ConeEntry> ConeCache<E> {
                 samples: body.entries[texel].confidence(),
                 is_new,
                 moved: moved >> texel & 1 == 1,
+                absent,
             });
         }
         self.heads[slot].known |= wanted;

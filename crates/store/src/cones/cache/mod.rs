@@ -128,6 +128,8 @@ struct Body<E> {
     places: [TexelPlace; BLOCK_TEXELS],
     /// Frame of the last update.
     updated: [u32; BLOCK_TEXELS],
+    /// When somebody last wanted it.
+    wanted: [u32; BLOCK_TEXELS],
     entries: [E; BLOCK_TEXELS],
 }
 
@@ -136,6 +138,7 @@ impl<E: ConeEntry> Body<E> {
         Box::new(Body {
             places: [TexelPlace::default(); BLOCK_TEXELS],
             updated: [0; BLOCK_TEXELS],
+            wanted: [0; BLOCK_TEXELS],
             entries: std::array::from_fn(|_| E::default()),
         })
     }

@@ -214,8 +214,13 @@ fn a_texel_keeps_its_place_and_its_age_unless_only_neighbours_had_asked() {
     let of_4 = third.iter().find(|q| q.id == first[1].id).unwrap();
     assert!(of_4.moved && of_4.place.is_inside() && of_4.place.triangle == 12);
     assert_eq!((of_4.age, of_4.samples, of_4.is_new), (2, 1, false));
+    assert_eq!(of_4.absent, 1, "not wanted in the second frame");
     let fourth = admit(&at(4.5, 13), false);
-    assert!(!fourth[0].moved && fourth[0].place.triangle == 12);
+    assert!(!fourth[0].moved && fourth[0].place.triangle == 12 && fourth[0].absent == 0);
+    // Nobody looks for two frames.
+    assert!(admit(&[None], false).is_empty() && admit(&[None], false).is_empty());
+    let fifth = admit(&at(4.5, 13), false);
+    assert!(fifth[0].absent == 2 && !fifth[0].is_new);
 }
 
 #[test]

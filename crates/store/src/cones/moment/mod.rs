@@ -292,6 +292,8 @@ impl MomentEntry {
             cone.scale(kept);
         }
         let before = self.cones.map(|cone| cone.lights);
+        // Those that nothing is left of take no samples in: they have no direction, and are of lights that were.
+        self.drop_dark();
         for sample in samples {
             if let Some((value, direction)) = sample.usable() {
                 let value = value * weight;

@@ -369,6 +369,20 @@ fn what_is_seen_is_the_mean_of_seen_and_hidden_samples() {
 }
 
 #[test]
+fn an_entry_that_is_cut_to_nothing_begins_anew() {
+    let params = MomentParams::default();
+    let of = |degrees: f32, light| sample(tilted(degrees), Vec3::ONE, light);
+    let mut entry = MomentEntry::default();
+    entry.update_seen(&[of(60.0, 0), of(0.0, 1), of(-60.0, 2)], &[hidden(0, 1.0)], 4, |_| 0.3, &params);
+    entry.cut_confidence(0);
+    let mut fresh = MomentEntry::default();
+    for entry in [&mut entry, &mut fresh] {
+        entry.update_seen(&[of(-40.0, 0), of(10.0, 3)], &[], 2, |_| 0.5, &params);
+    }
+    assert_eq!(entry.cones(), fresh.cones());
+}
+
+#[test]
 fn a_light_that_comes_out_was_hidden_until_then() {
     let params = MomentParams::default();
     let mut entry = MomentEntry::default();

@@ -1,0 +1,124 @@
+//! Which light of entries is shaded by the shapes of lights, and that it is as much as they see.
+
+use dapple_scene::area_lights::AreaLights;
+use dapple_scene::{EmitterShape, Material, Mesh, Reflectance, ShadingPoint};
+use dapple_store::cones::{
+    CacheParams, ChartPlace, ConeCache, EntrySite, LightSet, LookUp, MomentCone, MomentEntry, PixelPlace,
+    Requests, View,
+};
+use dapple_store::light_visibility::SeenLight;
+use glam::{Affine3A, Vec3};
+
+use super::*;
+use crate::area_lights::{AreaLightTable, shade_area_lights};
+use crate::testing::{Stage, matte, sphere};
+
+const LAMP: Vec3 = Vec3::new(0.5, 2.0, -0.4);
+
+fn lamp(emitter: EmitterShape, mesh: Mesh) -> AreaLightTable {
+    let mut stage = Stage::new();
+    let material =
+        stage.add_material(Material { emissive_factor: Vec3::new(3.0, 2.0, 1.0), ..matte(Vec3::ZERO) });
+    let light =
+        stage.add(mesh, material, Affine3A::from_translation(LAMP) * Affine3A::from_scale(Vec3::splat(0.2)));
+    stage.scene.instances[light as usize].emitter = emitter;
+    AreaLightTable::new(&AreaLights::new(&stage.scene, &stage.pose))
+}
+
+fn floor(roughness: f32) -> ShadingPoint {
+    let (diffuse, f0) = (Vec3::splat(0.4), Vec3::splat(0.3));
+    ShadingPoint {
+        instance: 0,
+        position_world: Vec3::ZERO,
+        normal_world: Vec3::Y,
+        normal_shading_world: Vec3::Y,
+        to_viewer_world: Vec3::new(-0.5, 1.5, 0.3).normalize(),
+        reflectance: Reflectance { diffuse, f0, alpha: roughness * roughness, specular: true },
+        emitted: Vec3::splat(0.125),
+    }
+}
+
+/// A cone of light 0, of so much of it, with an energy that is wrong.
+fn cone(seen: f32, energy: f32) -> MomentCone {
+    let cone = MomentCone::from_cap(LAMP.normalize(), 0.995, Vec3::splat(energy), 0.95, LightSet::one(0));
+    MomentCone { seen, ..cone }
+}
+
+/// What a place shows whose four entries hold these cones.
+fn shaded(point: &ShadingPoint, cones: [&[MomentCone]; 4], lights: Option<&AreaLightTable>) -> Vec3 {
+    let place = ChartPlace { chart: 0, uv: [8.0; 2], depth: 0.0, size: [50, 50], texel_m: 1.0 };
+    let pixel = PixelPlace {
+        instance: 0,
+        triangle: 0,
+        barycentrics: [0.25; 2],
+        place,
+        footprint_m: 1.0,
+        lean: [0.0; 2],
+    };
+    let pixels = [Some(pixel)];
+    let mut cache = ConeCache::<MomentEntry>::new(CacheParams::default()).unwrap();
+    let queue = cache.admit(&Requests::gather(&[View { width: 1, pixels: &pixels }], &LookUp::default()));
+    assert_eq!(queue.texels.len(), 4, "a place between four texels");
+    let update = |i: usize, _: &_, entry: &mut MomentEntry| {
+        *entry = MomentEntry::from_parts(cones[i], 64, 64);
+        true
+    };
+    assert_eq!(cache.update(&queue, update), Ok(4));
+    let site = EntrySite { position_world: Vec3::ZERO, normal_world: Vec3::Y, normal_shading_world: Vec3::Y };
+    let light = ConeLight { cache: &cache, place_of: |_| Some(site), lights };
+    shade_cones(&light, &[Some(*point)], &pixels, &SlcShading::default())[0]
+}
+
+fn by_shape(point: &ShadingPoint, table: &AreaLightTable) -> Vec3 {
+    shade_area_lights(&[Some(*point)], table, |_, row| row.fill(SeenLight::ALL))[0]
+}
+
+#[track_caller]
+fn assert_near(found: Vec3, exact: Vec3) {
+    assert!(found.distance(exact) <= 1e-4 * exact.length(), "{found}, {exact}");
+}
+
+#[test]
+fn a_light_that_is_seen_whole_has_its_own_shape_whatever_its_energy() {
+    let table = lamp(EmitterShape::Sphere, sphere(8, 12));
+    for roughness in [0.2, 0.8] {
+        let point = floor(roughness);
+        let exact = point.emitted + by_shape(&point, &table);
+        for energy in [1e-3, 0.1, 7.0] {
+            let whole = [cone(1.0, energy)];
+            assert_near(shaded(&point, [&whole; 4], Some(&table)), exact);
+            // Two cones that it fell into.
+            let parts = [cone(0.3, energy), cone(0.7, energy)];
+            assert_near(shaded(&point, [&parts; 4], Some(&table)), exact);
+        }
+    }
+}
+
+#[test]
+fn entries_that_see_part_of_a_light_have_that_part() {
+    let table = lamp(EmitterShape::Sphere, sphere(8, 12));
+    let point = floor(0.9);
+    let matte = ShadingPoint { reflectance: Reflectance { specular: false, ..point.reflectance }, ..point };
+    let exact = by_shape(&matte, &table);
+    let [whole, half] = [[cone(1.0, 0.2)], [cone(0.5, 0.1)]];
+    // Two of four see all of it, one half, one nothing.
+    let found = shaded(&matte, [&whole, &whole, &half, &[]], Some(&table));
+    assert_near(found, matte.emitted + exact * 0.625);
+}
+
+#[test]
+fn what_is_not_known_or_has_no_form_is_left_to_cones() {
+    let table = lamp(EmitterShape::Sphere, sphere(8, 12));
+    let ball = lamp(EmitterShape::Triangles, sphere(12, 20));
+    let point = floor(0.5);
+    let cones = [cone(1.0, 0.2)];
+    let alone = shaded(&point, [&cones; 4], None);
+    let unknown = [cone(0.0, 0.2)];
+    assert_eq!(shaded(&point, [&unknown; 4], Some(&table)), alone);
+    // Of many triangles: places stand for it.
+    assert_eq!(shaded(&point, [&cones; 4], Some(&ball)), alone);
+    assert_eq!(ball.slot_of_form(0), None);
+    // One that is not in the table.
+    assert_eq!((table.slot_of_form(0), table.slot_of_form(1)), (Some(0), None));
+    assert!(shaded(&point, [&cones; 4], Some(&table)) != alone);
+}
