@@ -135,10 +135,9 @@ impl Update for MomentEntry {
                 // What it knows is of a place beside it.
                 ConeEntry::cut_confidence(entry, KEPT as u16);
             }
-            let missed = changes.missed(texel.absent);
-            if missed > 0 {
+            if let Some(kept) = (KEPT as u32).checked_div(changes.missed(texel.absent)) {
                 // What it knows may be of another time.
-                ConeEntry::cut_confidence(entry, (KEPT as u32 / missed) as u16);
+                ConeEntry::cut_confidence(entry, kept as u16);
             }
             let turn = turn_of(texel.id);
             // When it is its turn in any case.

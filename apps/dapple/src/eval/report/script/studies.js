@@ -4,10 +4,12 @@ const STUDY_SLOTS = Object.keys(SLOTS);
 
 /** How the line of a number looks: the same in the plot and in its legend. */
 function studyLook(number) {
+  const round = Math.floor(number / STUDY_SLOTS.length);
   return {
     color: () => SLOTS[STUDY_SLOTS[number % STUDY_SLOTS.length]][isDark() ? "dark" : "light"],
-    mark: MARKS[number % MARKS.length],
-    dash: DASHES[Math.floor(number / STUDY_SLOTS.length) % DASHES.length],
+    // A lone point shows no dashes: where a colour comes again, it has another mark.
+    mark: MARKS[(number + 3 * round) % MARKS.length],
+    dash: DASHES[round % DASHES.length],
   };
 }
 
