@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use cargo_metadata::Metadata;
@@ -53,8 +54,8 @@ impl Step {
 /// Runs steps and remembers how they ended.
 pub(crate) struct Runner {
     metadata: Metadata,
-    passed: Vec<Step>,
-    failed: Vec<Step>,
+    passed: Vec<String>,
+    failed: Vec<String>,
     skipped: Vec<String>,
 }
 
@@ -68,11 +69,15 @@ impl Runner {
     pub(crate) fn run(&mut self, steps: &[Step]) {
         for &step in steps {
             println!("\n== {}", step.name());
-            match self.run_step(step) {
-                Ok(()) => self.passed.push(step),
+            let started = Instant::now();
+            let outcome = self.run_step(step);
+            // Where the time of a check goes is seen in its last lines.
+            let ended = format!("{} ({:.0} s)", step.name(), started.elapsed().as_secs_f64());
+            match outcome {
+                Ok(()) => self.passed.push(ended),
                 Err(error) => {
                     eprintln!("{}: {error:#}", step.name());
-                    self.failed.push(step);
+                    self.failed.push(ended);
                 }
             }
         }
@@ -91,10 +96,10 @@ impl Runner {
             println!("{line}");
         }
         if !self.passed.is_empty() {
-            println!("passed: {}", names(&self.passed));
+            println!("passed: {}", self.passed.join(", "));
         }
         if !self.failed.is_empty() {
-            bail!("failed: {}", names(&self.failed));
+            bail!("failed: {}", self.failed.join(", "));
         }
         Ok(())
     }
@@ -131,8 +136,9 @@ impl Runner {
     }
 
     fn smoke(&self) -> Result<()> {
-        // The same packages and features as the tests, so that nothing is compiled twice; `cargo run` would choose others.
-        self.cargo(&["build", "--quiet", "--workspace", "--all-features", "--bin=dapple"])?;
+        // With the tests, which bring features of their own: built alone, the program and half of what it stands on would be
+        // compiled twice.
+        self.cargo(&["test", "--quiet", "--no-run", "--workspace", "--all-features"])?;
         let program = self
             .metadata
             .target_directory
@@ -210,8 +216,4 @@ impl Runner {
         }
         Ok(())
     }
-}
-
-fn names(steps: &[Step]) -> String {
-    steps.iter().map(|s| s.name()).collect::<Vec<_>>().join(", ")
 }

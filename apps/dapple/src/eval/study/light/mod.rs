@@ -10,7 +10,7 @@ use anyhow::{Result, bail};
 use dapple_metrics::{PIXELS_PER_DEGREE, flip, psnr, ssim};
 use dapple_render::image::{LinearImage, Rgb8Image, ToneMap};
 use dapple_scene::Pose;
-use dapple_scene::area_lights::AreaLights;
+use dapple_scene::area_lights::{AreaLights, luminance};
 use dapple_scene::glam::Vec3;
 use dapple_server::cones::Now;
 use dapple_store::cones::Charting;
@@ -112,7 +112,7 @@ struct Quality {
     mse: f64,
     ssim: f64,
     flip: f64,
-    /// Of the mean luminance, parts.
+    /// See [`bias`].
     bias: f64,
     count: f64,
 }
@@ -128,11 +128,7 @@ impl Quality {
         self.ssim += ssim(width, height, &luma(&a.pixels), &luma(&b.pixels))?;
         self.flip +=
             flip(width, height, a.pixels.as_flattened(), b.pixels.as_flattened(), PIXELS_PER_DEGREE)?.mean;
-        // Of what a display can show: a lamp's own brightness would hide all else.
-        let mean = |pixels: &[Vec3]| {
-            pixels.iter().map(|p| f64::from(p.min(Vec3::splat(4.0)).element_sum())).sum::<f64>()
-        };
-        self.bias += mean(found) / mean(truth).max(1e-12) - 1.0;
+        self.bias += bias(truth, found);
         self.count += 1.0;
         Ok(())
     }
@@ -152,6 +148,22 @@ impl Quality {
     fn bias_percent(&self) -> f64 {
         100.0 * self.bias / self.count
     }
+}
+
+/// Most of a channel at pixels whose means are compared: the brightness of a lamp itself, or its mirror image, would hide all else.
+const BRIGHTEST: f32 = 4.0;
+
+/// How much brighter the mean luminance is than the truth's, parts, over pixels that are no lamp in truth. What is found there is taken as it is:
+/// cut to what a display can show, noise would look like a lack of light.
+fn bias(truth: &[Vec3], found: &[Vec3]) -> f64 {
+    let (mut all, mut more) = (0.0, 0.0);
+    for (truth, found) in truth.iter().zip(found) {
+        if truth.max_element() <= BRIGHTEST {
+            all += f64::from(luminance(*truth));
+            more += f64::from(luminance(*found - *truth));
+        }
+    }
+    more / f64::max(all, 1e-12)
 }
 
 /// What a display shows.
