@@ -70,7 +70,12 @@ impl<'a, E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite>> Blender<'a, E
         let each_apart = self.shading.blending == Blending::Cones || count == 1;
         let widest = widest_part(point);
         let slot_of = |cap: &Cap, seen: Option<SeenPart>| {
-            let seen = seen.filter(|seen| seen.of_all >= WHOLE || 1.0 - cap.cos_angle <= widest)?;
+            let seen = seen?;
+            let (is_whole, is_narrow) = (seen.of_all >= WHOLE, 1.0 - cap.cos_angle <= widest);
+            let by_shape = if seen.is_settled { is_whole && is_narrow } else { is_whole || is_narrow };
+            if !by_shape {
+                return None;
+            }
             Some((self.light.lights?.slot_of_form(seen.light)?, seen.fraction))
         };
         for (teller, read) in (1..).zip(reads[..count].iter().flatten()) {

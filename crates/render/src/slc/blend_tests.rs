@@ -44,8 +44,18 @@ fn cone(seen: f32, energy: f32) -> MomentCone {
     MomentCone { seen, ..cone }
 }
 
-/// What a place shows whose four entries hold these cones.
+/// What a place shows whose four entries hold these cones, young ones.
 fn shaded(point: &ShadingPoint, cones: [&[MomentCone]; 4], lights: Option<&AreaLightTable>) -> Vec3 {
+    shaded_after(16, point, cones, lights)
+}
+
+/// The same of entries of so many samples.
+fn shaded_after(
+    samples: u16,
+    point: &ShadingPoint,
+    cones: [&[MomentCone]; 4],
+    lights: Option<&AreaLightTable>,
+) -> Vec3 {
     let place = ChartPlace { chart: 0, uv: [8.0; 2], depth: 0.0, size: [50, 50], texel_m: 1.0 };
     let pixel = PixelPlace {
         instance: 0,
@@ -60,7 +70,7 @@ fn shaded(point: &ShadingPoint, cones: [&[MomentCone]; 4], lights: Option<&AreaL
     let queue = cache.admit(&Requests::gather(&[View { width: 1, pixels: &pixels }], &LookUp::default()));
     assert_eq!(queue.texels.len(), 4, "a place between four texels");
     let update = |i: usize, _: &_, entry: &mut MomentEntry| {
-        *entry = MomentEntry::from_parts(cones[i], 64, 64);
+        *entry = MomentEntry::from_parts(cones[i], samples, u32::from(samples));
         true
     };
     assert_eq!(cache.update(&queue, update), Ok(4));
@@ -121,4 +131,17 @@ fn what_is_not_known_or_has_no_form_is_left_to_cones() {
     // One that is not in the table.
     assert_eq!((table.slot_of_form(0), table.slot_of_form(1)), (Some(0), None));
     assert!(shaded(&point, [&cones; 4], Some(&table)) != alone);
+}
+
+#[test]
+fn settled_entries_show_parts_by_their_cones_and_what_is_narrow_and_whole_by_its_shape() {
+    let table = lamp(EmitterShape::Sphere, sphere(8, 12));
+    let (rough, smooth) = (floor(0.9), floor(0.05));
+    let [whole, half] = [[cone(1.0, 0.2)], [cone(0.5, 0.1)]];
+    let settled = |point, cones: &[MomentCone], lights| shaded_after(200, point, [cones; 4], lights);
+    assert_near(settled(&rough, &whole, Some(&table)), rough.emitted + by_shape(&rough, &table));
+    assert_eq!(settled(&rough, &half, Some(&table)), settled(&rough, &half, None));
+    // Wider than the lobe.
+    assert_eq!(settled(&smooth, &whole, Some(&table)), settled(&smooth, &whole, None));
+    assert!(shaded(&smooth, [&whole; 4], Some(&table)) != shaded(&smooth, [&whole; 4], None));
 }

@@ -34,6 +34,8 @@ pub struct SeenPart {
     pub fraction: f32,
     /// Part of it that comes through all cones.
     pub of_all: f32,
+    /// Whether the cone is of so many samples that noise of its energy matters less than what a shape leaves out.
+    pub is_settled: bool,
 }
 
 /// An entry whose cones can be shaded with.
@@ -42,6 +44,9 @@ pub trait Caps {
     fn each_cap(&self, cap: impl FnMut(Cap, Option<SeenPart>));
 }
 
+/// Samples from which on an entry is settled: near the 64 that new ones take in a row, and more than what is kept where lights move.
+const SETTLED: u16 = 48;
+
 impl Caps for MomentEntry {
     #[inline]
     fn each_cap(&self, mut cap: impl FnMut(Cap, Option<SeenPart>)) {
@@ -49,8 +54,12 @@ impl Caps for MomentEntry {
             let (direction, cos_angle) = cone.axis();
             let mean_cosine = cone.mean_cosine();
             let seen = cone.lights.single().filter(|_| cone.seen > 0.0);
-            let seen =
-                seen.map(|light| SeenPart { light, fraction: cone.seen, of_all: self.seen_of(cone.lights) });
+            let seen = seen.map(|light| SeenPart {
+                light,
+                fraction: cone.seen,
+                of_all: self.seen_of(cone.lights),
+                is_settled: self.samples() >= SETTLED,
+            });
             cap(Cap { direction, cos_angle, energy: cone.energy, mean_cosine }, seen);
         }
     }
