@@ -75,7 +75,7 @@ fn run(task: Task) -> Result<()> {
             if let Err(error) = relay::install(runner.target()) {
                 runner.skip(&format!("skipped: sessions through relays, {error:#}"));
             }
-            runner.run(&[Step::Smoke]);
+            runner.run(&[Step::Build, Step::Smoke]);
             runner.run(&test);
         }
     }

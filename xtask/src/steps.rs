@@ -26,6 +26,8 @@ pub(crate) enum Step {
     Page,
     /// See [`relay`].
     Relay,
+    /// Programs and tests, compiled.
+    Build,
     /// The whole loop on a small scene, by the command itself.
     Smoke,
     /// Documentation examples.
@@ -44,6 +46,7 @@ impl Step {
             Step::Tidy => "tidy",
             Step::Page => "page",
             Step::Relay => "relay",
+            Step::Build => "build",
             Step::Smoke => "smoke evaluation",
             Step::DocTests => "documentation examples",
             Step::Tests => "tests",
@@ -129,6 +132,9 @@ impl Runner {
             Step::Tidy => tidy::check(self.root()),
             Step::Page => self.page(),
             Step::Relay => relay::install(self.target()),
+            // All at once: tests bring features of their own, and a program built before them would be compiled twice, with half of
+            // what it stands on.
+            Step::Build => self.cargo(&["test", "--quiet", "--no-run", "--workspace", "--all-features"]),
             Step::Smoke => self.smoke(),
             Step::DocTests => self.cargo(&["test", "--doc", "--workspace", "--all-features"]),
             Step::Tests => self.tests(),
@@ -136,9 +142,6 @@ impl Runner {
     }
 
     fn smoke(&self) -> Result<()> {
-        // With the tests, which bring features of their own: built alone, the program and half of what it stands on would be
-        // compiled twice.
-        self.cargo(&["test", "--quiet", "--no-run", "--workspace", "--all-features"])?;
         let program = self
             .metadata
             .target_directory

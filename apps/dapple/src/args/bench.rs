@@ -53,6 +53,9 @@ pub(crate) struct ServedArgs {
     /// Updates a second.
     #[arg(long, value_name = "H", default_value_t = 20.0)]
     pub(crate) hz: f64,
+    /// With how much of each area light is seen, too (as dapple serve --area-lights).
+    #[arg(long)]
+    pub(crate) area_lights: bool,
     /// Join over QUIC (MoQ), as the server says, or at a relay's address (as dapple view --moq). Needs the feature moq.
     #[arg(long, value_name = "RELAY", num_args = 0..=1, default_missing_value = "")]
     pub(crate) moq: Option<String>,
@@ -63,7 +66,7 @@ pub(crate) struct ViewersArgs {
     #[command(flatten)]
     pub(crate) served: ServedArgs,
     /// Address of a server that runs already, over plain HTTP.
-    #[arg(long, value_name = "URL", conflicts_with_all = ["builtin", "detail", "points", "hz"])]
+    #[arg(long, value_name = "URL", conflicts_with_all = ["builtin", "detail", "points", "hz", "area_lights"])]
     pub(crate) url: Option<String>,
     /// Numbers of viewers that are tried, one after the other.
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [1, 10, 100, 1000])]

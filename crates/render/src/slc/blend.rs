@@ -69,29 +69,38 @@ impl<'a, E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite>> Blender<'a, E
         let mut heaviest: Option<(f32, Vec3, &Read<'_, E>)> = None;
         let each_apart = self.shading.blending == Blending::Cones || count == 1;
         let widest = widest_part(point);
-        let slot_of = |cap: &Cap, seen: Option<SeenPart>| {
+        // The light whose shape stands for a cone, what is seen of it, and for how much of the cone: the rest is the cone's.
+        let shape_of = |cap: &Cap, seen: Option<SeenPart>| {
             let seen = seen?;
             let (is_whole, is_narrow) = (seen.of_all >= WHOLE, 1.0 - cap.cos_angle <= widest);
-            let by_shape = if seen.is_settled { is_whole && is_narrow } else { is_whole || is_narrow };
-            if !by_shape {
-                return None;
-            }
-            Some((self.light.lights?.slot_of_form(seen.light)?, seen.fraction))
+            let share = match (is_whole, is_narrow) {
+                (true, true) => 1.0,
+                (false, false) => return None,
+                _ => 1.0 - seen.settled,
+            };
+            let slot = self.light.lights?.slot_of_form(seen.light).filter(|_| share > 0.0)?;
+            Some((slot, seen.fraction, share))
+        };
+        let rest_of = |cap: Cap, seen: Option<SeenPart>| {
+            let share = shape_of(&cap, seen).map_or(0.0, |(.., share)| share);
+            (share < 1.0).then(|| Cap { energy: cap.energy * (1.0 - share), ..cap })
         };
         for (teller, read) in (1..).zip(reads[..count].iter().flatten()) {
             let mut irradiance = Vec3::ZERO;
             read.entry.each_cap(|cap, seen| {
-                if let Some((slot, fraction)) = slot_of(&cap, seen) {
+                if let Some((slot, fraction, share)) = shape_of(&cap, seen) {
                     let at = parts[..used].iter().position(|part| part.slot == slot).unwrap_or(used);
                     // A sample reads no more cones than there are places.
                     let Some(part) = parts.get_mut(at) else { return };
                     used = used.max(at + 1);
                     part.slot = slot;
-                    part.add(&cap, fraction, read.weight);
+                    part.add(&cap, fraction, read.weight * share);
                     if part.teller != teller {
-                        (part.teller, part.told) = (teller, part.told + read.weight);
+                        (part.teller, part.told) = (teller, part.told + read.weight * share);
                     }
-                } else if each_apart {
+                }
+                let Some(cap) = rest_of(cap, seen) else { return };
+                if each_apart {
                     lens.add(&cap, &read.ground, read.weight);
                 } else {
                     irradiance += cap.irradiance(point.normal_shading_world);
@@ -106,7 +115,7 @@ impl<'a, E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite>> Blender<'a, E
         let mut radiance = Vec3::ZERO;
         if let Some((_, irradiance, read)) = heaviest {
             read.entry.each_cap(|cap, seen| {
-                if slot_of(&cap, seen).is_none() {
+                if let Some(cap) = rest_of(cap, seen) {
                     lens.add(&cap, &read.ground, 1.0);
                 }
             });

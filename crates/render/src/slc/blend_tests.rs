@@ -144,4 +144,7 @@ fn settled_entries_show_parts_by_their_cones_and_what_is_narrow_and_whole_by_its
     // Wider than the lobe.
     assert_eq!(settled(&smooth, &whole, Some(&table)), settled(&smooth, &whole, None));
     assert!(shaded(&smooth, [&whole; 4], Some(&table)) != shaded(&smooth, [&whole; 4], None));
+    // Half way.
+    let between = shaded_after(64, &rough, [&half; 4], Some(&table));
+    assert_near(between, 0.5 * (settled(&rough, &half, None) + shaded(&rough, [&half; 4], Some(&table))));
 }

@@ -34,8 +34,8 @@ pub struct SeenPart {
     pub fraction: f32,
     /// Part of it that comes through all cones.
     pub of_all: f32,
-    /// Whether the cone is of so many samples that noise of its energy matters less than what a shape leaves out.
-    pub is_settled: bool,
+    /// How much noise of the cone's energy matters less than what a shape leaves out, 0 … 1: 1 for an entry of many samples.
+    pub settled: f32,
 }
 
 /// An entry whose cones can be shaded with.
@@ -44,8 +44,11 @@ pub trait Caps {
     fn each_cap(&self, cap: impl FnMut(Cap, Option<SeenPart>));
 }
 
-/// Samples from which on an entry is settled: near the 64 that new ones take in a row, and more than what is kept where lights move.
-const SETTLED: u16 = 48;
+/// [`SeenPart::settled`] of an entry of so many samples: from 32 to 96. A ramp, since where lights move C goes up and down by the samples of an
+/// update from frame to frame.
+fn settled(samples: u16) -> f32 {
+    ((f32::from(samples) - 32.0) / 64.0).clamp(0.0, 1.0)
+}
 
 impl Caps for MomentEntry {
     #[inline]
@@ -58,7 +61,7 @@ impl Caps for MomentEntry {
                 light,
                 fraction: cone.seen,
                 of_all: self.seen_of(cone.lights),
-                is_settled: self.samples() >= SETTLED,
+                settled: settled(self.samples()),
             });
             cap(Cap { direction, cos_angle, energy: cone.energy, mean_cosine }, seen);
         }

