@@ -373,5 +373,6 @@ fn surroundings_are_light_and_what_moves_before_them_is_noticed() {
     for _ in 0..40 {
         rig.step(&mut cache, &aside, &aside, &params);
     }
-    assert_near(mean(&cache), 3.0 * PI, 0.02);
+    // The worth of eight samples of before, with half the light, is among a hundred.
+    assert_near(mean(&cache), 3.0 * PI, 0.05);
 }
