@@ -439,11 +439,11 @@ fn what_cannot_be_served_is_said_before_anything_takes_time() {
     fail(at, &["view", "--url", "http://127.0.0.1:1/", "--headless"], &["127.0.0.1:1"]);
 }
 
-/// Viewers that come, go, break off, stall and move things. `DAPPLE_SOAK_SECONDS` sets for how long (default 30).
+/// Viewers that come, go, break off, stall and move things. `DAPPLE_SOAK_SECONDS` sets for how long (default 60).
 #[test]
 fn a_soak_loses_nothing_and_memory_stays_flat() {
     let folder = TempDir::new().unwrap();
-    let seconds = std::env::var("DAPPLE_SOAK_SECONDS").unwrap_or_else(|_| "30".to_owned());
+    let seconds = std::env::var("DAPPLE_SOAK_SECONDS").unwrap_or_else(|_| "60".to_owned());
     let out = succeed(
         folder.path(),
         &["bench", "soak", "--seconds", &seconds, "--detail", "0.05", "--points", "40", "--viewers", "16"],

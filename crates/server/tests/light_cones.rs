@@ -93,44 +93,17 @@ fn cone_light<'a>(
     ConeLight { cache: server.cache(), place_of: |id| server.place_of(id), lights: Some(table) }
 }
 
-/// Cones of one way to shade, and what they came to.
-struct Run {
-    name: &'static str,
-    server: ConeServer<MomentEntry>,
-    shading: SlcShading,
-    shapes: bool,
-    picture: Vec<Vec3>,
-    step_ms: Vec<f64>,
-}
-
-impl Run {
-    fn new(name: &'static str, shading: SlcShading) -> Run {
-        let server = ConeServer::new(CacheParams::default(), shading.look_up).unwrap();
-        Run { name, server, shading, shapes: true, picture: Vec::new(), step_ms: Vec::new() }
-    }
-
-    fn step(&mut self, stage: &Stage, now: &Now<'_>, seen: &Seen) {
-        let start = Instant::now();
-        let Seen { camera, gbuffer, points } = seen;
-        let pixels = pixel_places(&stage.scene, now.pose, camera, gbuffer, points, &stage.charting);
-        let view = View { width: stage.size[0] as usize, pixels: &pixels };
-        self.server.step(now, &[view], &SlcParams::default(), &mut |_| ());
-        let table = AreaLightTable::new(&now.lights(now.pose));
-        let light = ConeLight { lights: self.shapes.then_some(&table), ..cone_light(&self.server, &table) };
-        self.picture = shade_cones(&light, points, &pixels, &self.shading);
-        self.step_ms.push(start.elapsed().as_secs_f64() * 1e3);
-    }
-}
-
-fn runs() -> Vec<Run> {
+/// Cones as they are kept by default, shaded in each way.
+fn ways() -> Vec<Lit> {
     let near = LookUp { blend: false, ..LookUp::default() };
     let wide = LookUp { bias: 2.0, ..LookUp::default() };
+    let shading = SlcShading::default();
     vec![
-        Run { shapes: false, ..Run::new("slc by cones alone", SlcShading::default()) },
-        Run::new("slc", SlcShading::default()),
-        Run::new("slc, all cones", SlcShading { blending: Blending::Cones, ..SlcShading::default() }),
-        Run::new("slc, one texel", SlcShading { look_up: near, ..SlcShading::default() }),
-        Run::new("slc, bias 2", SlcShading { look_up: wide, ..SlcShading::default() }),
+        Lit::new("slc by cones alone", shading, false),
+        Lit::new("slc", shading, true),
+        Lit::new("slc, all cones", SlcShading { blending: Blending::Cones, ..shading }, true),
+        Lit::new("slc, one texel", SlcShading { look_up: near, ..shading }, true),
+        Lit::new("slc, bias 2", SlcShading { look_up: wide, ..shading }, true),
     ]
 }
 
@@ -142,39 +115,30 @@ fn measure(stage: &Stage, steps: usize, timed: usize, samples: u32) -> Vec<(&'st
     let seen = stage.see(&now);
     let params = DirectParams { samples, seed: 7, ..DirectParams::default() };
     let truth = rays(&now, &seen.points, &params);
-    let mut runs = runs();
+    let mut ways = ways();
     for _ in 0..steps {
-        runs.iter_mut().for_each(|run| run.step(stage, &now, &seen));
+        ways.iter_mut().for_each(|lit| lit.step(stage, &now, Some(&seen)));
     }
-    runs.iter_mut().for_each(|run| run.step_ms.clear());
-    // Times and the last picture of rays by power, and by the best sampler.
-    let mut rivals = [(Pick::Power, Sequence::Random), (Pick::Fluence, Sequence::Lattice)]
-        .map(|sampler| (sampler, Vec::new(), Vec::new()));
-    for seed in 0..timed as u64 {
-        for ((pick, sequence), ms, picture) in &mut rivals {
-            let start = Instant::now();
-            let (pick, sequence) = (*pick, *sequence);
-            *picture =
-                rays(&now, &seen.points, &DirectParams { samples: 48, pick, sequence, seed, frame: 0 });
-            ms.push(start.elapsed().as_secs_f64() * 1e3);
-        }
-        runs.iter_mut().for_each(|run| run.step(stage, &now, &seen));
+    ways.iter_mut().for_each(|lit| lit.ms.clear());
+    let [_, power, best, _] = Rival::all();
+    let mut rivals = [power, best];
+    for frame in 0..timed as u64 {
+        rivals.iter_mut().for_each(|rival| rival.step(&now, stage.size, &seen, frame));
+        ways.iter_mut().for_each(|lit| lit.step(stage, &now, Some(&seen)));
     }
-    let rival_ms = median(&rivals[0].1);
-    for (name, (_, ms, picture)) in ["rt-48, power", "rt-48, best"].iter().zip(&rivals) {
+    let rival_ms = median(&rivals[0].ms);
+    let line = |name: &str, ms: &[f64], [db, ssim, bias]: [f64; 3]| {
+        println!("| {name} | {:.1} | {db:.2} | {ssim:.4} | {bias:+.2} |", rival_ms / median(ms));
+    };
+    for rival in rivals.iter().filter(|_| timed > 0) {
+        line(rival.name, &rival.ms, stage.quality(&truth, &rival.picture));
+    }
+    let found = ways.into_iter().map(|lit| {
+        let quality = stage.quality(&truth, &lit.picture);
         if timed > 0 {
-            let [db, ssim, bias] = stage.quality(&truth, picture);
-            println!("| {name} | {:.1} | {db:.2} | {ssim:.4} | {bias:+.2} |", rival_ms / median(ms));
+            line(lit.name, &lit.ms, quality);
         }
-    }
-    let found = runs.into_iter().map(|run| {
-        let quality = stage.quality(&truth, &run.picture);
-        if timed > 0 {
-            let [db, ssim, bias] = quality;
-            let quicker = rival_ms / median(&run.step_ms);
-            println!("| {} | {quicker:.1} | {db:.2} | {ssim:.4} | {bias:+.2} |", run.name);
-        }
-        (run.name, quality)
+        (lit.name, quality)
     });
     found.collect()
 }
@@ -193,7 +157,7 @@ fn the_mean_light_of_a_village_is_that_of_rays() {
 fn lights_that_move_are_shaded_by_their_shapes() {
     let stage = Stage::new("street", 0.1, [96, 54]);
     let [cones, shapes] = [false, true].map(|shapes| {
-        let mut lit = Lit::new(SlcShading::default(), shapes);
+        let mut lit = Lit::new("", SlcShading::default(), shapes);
         let mut tracer = Tracer::new(&stage.scene, &stage.scene.pose(stage.time_s));
         let mut quality = [0.0; 3];
         for step in 0..8 {
@@ -218,8 +182,8 @@ fn lights_that_move_are_shaded_by_their_shapes() {
 #[test]
 fn what_changed_out_of_sight_is_learnt_when_it_comes_back() {
     let stage = Stage::new("street", 0.1, [64, 36]);
-    let mut there = Lit::new(SlcShading::default(), false);
-    let mut fresh = Lit::new(SlcShading::default(), false);
+    let mut there = Lit::new("", SlcShading::default(), false);
+    let mut fresh = Lit::new("", SlcShading::default(), false);
     let mut tracer = Tracer::new(&stage.scene, &stage.scene.pose(0.0));
     // Long enough to be as good as it gets, and to take no more rays.
     let moments = (0..300).map(|_| (2.0, true)).chain((1..20).map(|i| (2.0 + f64::from(i) / 5.0, false)));
@@ -307,6 +271,7 @@ impl Rival {
 
 /// Steps of cones, what of them is the server's where clients shade, milliseconds, and the last picture.
 struct Lit {
+    name: &'static str,
     server: ConeServer<MomentEntry>,
     shading: SlcShading,
     shapes: bool,
@@ -316,9 +281,9 @@ struct Lit {
 }
 
 impl Lit {
-    fn new(shading: SlcShading, shapes: bool) -> Lit {
+    fn new(name: &'static str, shading: SlcShading, shapes: bool) -> Lit {
         let server = ConeServer::new(CacheParams::default(), shading.look_up).unwrap();
-        Lit { server, shading, shapes, ms: Vec::new(), server_ms: Vec::new(), picture: Vec::new() }
+        Lit { name, server, shading, shapes, ms: Vec::new(), server_ms: Vec::new(), picture: Vec::new() }
     }
 
     /// Without a viewer, the server goes on alone.
@@ -351,15 +316,7 @@ fn median(ms: &[f64]) -> f64 {
 /// Plays a scene to a viewer who stands, methods in turn; prints what the last steps took, and how the last picture is.
 fn play(stage: &Stage, (steps, timed, samples): (u32, u32, u32)) {
     let mut rivals = Rival::all();
-    let near = LookUp { blend: false, ..LookUp::default() };
-    let one = SlcShading { look_up: near, ..SlcShading::default() };
-    let wide = LookUp { bias: 2.0, ..LookUp::default() };
-    let mut cones = [
-        ("slc by cones alone", Lit::new(SlcShading::default(), false)),
-        ("slc", Lit::new(SlcShading::default(), true)),
-        ("slc, one texel", Lit::new(one, true)),
-        ("slc, bias 2", Lit::new(SlcShading { look_up: wide, ..SlcShading::default() }, true)),
-    ];
+    let mut cones = ways();
     let camera = stage.scene.camera_paths()[0].camera(&stage.scene, &stage.scene.pose(stage.time_s));
     let mut tracer = Tracer::new(&stage.scene, &stage.scene.pose(stage.time_s));
     for step in 0..steps {
@@ -373,7 +330,7 @@ fn play(stage: &Stage, (steps, timed, samples): (u32, u32, u32)) {
                 rival.step(&now, stage.size, &seen, u64::from(step));
             }
         }
-        for (_, lit) in &mut cones {
+        for lit in &mut cones {
             lit.step(stage, &now, Some(&seen));
         }
         if step + 1 < steps {
@@ -389,8 +346,8 @@ fn play(stage: &Stage, (steps, timed, samples): (u32, u32, u32)) {
         for rival in &rivals {
             line(rival.name, last(&rival.ms), last(&rival.ms), &rival.picture);
         }
-        for (name, lit) in &cones {
-            line(name, last(&lit.ms), last(&lit.server_ms), &lit.picture);
+        for lit in &cones {
+            line(lit.name, last(&lit.ms), last(&lit.server_ms), &lit.picture);
         }
     }
 }

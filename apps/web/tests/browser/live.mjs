@@ -14,7 +14,7 @@ import { isLive, open as openPage, until } from "./pages.mjs";
 
 // Time of the scene at which things are moved, seconds: boulders lie in view.
 const TIME = 14.6;
-const COARSE = "shadowResolution=128&samples=1&maxPixelRatio=0.25&fade=0";
+const COARSE = "shadowResolution=128&samples=1&maxPixelRatio=0.5&fade=0";
 
 const plan = JSON.parse(await readFile(process.argv[2], "utf8"));
 const facts = { errors: [] };

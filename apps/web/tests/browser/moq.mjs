@@ -11,7 +11,7 @@ import { join } from "node:path";
 import { launch } from "./launch.mjs";
 import { isLive, open as openPage, until } from "./pages.mjs";
 
-const COARSE = "shadowResolution=128&samples=1&maxPixelRatio=0.25&fade=0";
+const COARSE = "shadowResolution=128&samples=1&maxPixelRatio=0.5&fade=0";
 
 const plan = JSON.parse(await readFile(process.argv[2], "utf8"));
 const facts = { errors: [] };

@@ -292,16 +292,16 @@ fn lit_box() -> (Scene, CameraPath) {
 
 #[test]
 fn direct_light_by_every_method_is_near_the_truth() {
-    let found = run_on("kind = \"light-methods\"\nsteps = 10\ntruth-samples = 256", [96, 54], &[], lit_box());
+    // Large enough for the noise of reservoirs, which neighbours share, not to look like bias.
+    let found =
+        run_on("kind = \"light-methods\"\nsteps = 10\ntruth-samples = 256", [144, 81], &[], lit_box());
     let of = |name: &str, column: usize| {
         let row = found.tables[0].rows.iter().find(|row| row.name == name);
         row.unwrap_or_else(|| panic!("{name}")).values[column].unwrap()
     };
     let (rays, psnr, ssim, bias) = (2, 4, 5, 6);
     for row in &found.tables[0].rows {
-        // Few samples of reservoirs hold very much.
-        let most = if row.name.starts_with("restir-di") { 20.0 } else { 12.0 };
-        assert!(of(&row.name, psnr) > 20.0 && of(&row.name, bias).abs() < most, "{row:?}");
+        assert!(of(&row.name, psnr) > 20.0 && of(&row.name, bias).abs() < 12.0, "{row:?}");
     }
     assert!(of("slc", psnr) > of("rt-48", psnr) + 1.0 && of("slc", ssim) > of("rt-48", ssim));
     assert!(of("slc", rays) < of("rt-16", rays));

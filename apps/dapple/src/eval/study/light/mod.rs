@@ -153,8 +153,8 @@ impl Quality {
 /// Most of a channel at pixels whose means are compared: a lamp itself, its mirror image, or a wall beside it would hide all else.
 const BRIGHTEST: f32 = 4.0;
 
-/// How much brighter the mean luminance is than the truth's, parts, over pixels that are no brighter in truth than [`BRIGHTEST`]. What is found there is taken as it is:
-/// cut to what a display can show, noise would look like a lack of light.
+/// How much brighter the mean luminance is than the truth's, parts, over pixels that are no brighter in truth than [`BRIGHTEST`]. What is
+/// found there is taken as it is: cut to what a display can show, noise would look like a lack of light.
 fn bias(truth: &[Vec3], found: &[Vec3]) -> f64 {
     let (mut all, mut more) = (0.0, 0.0);
     for (truth, found) in truth.iter().zip(found) {
