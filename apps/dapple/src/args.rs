@@ -211,11 +211,11 @@ pub(crate) struct RenderArgs {
 /// Light of whatever emits.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct DirectLightArgs {
-    /// Light surfaces by what emits, by rt-N (N rays a sample), ris, restir-di, slc (light cones) or slc-paper; with -power behind it
-    /// lights are picked as the paper does. No sun is made up then. Without it what emits is seen, but lights nothing.
+    /// Light surfaces by what emits, by rt-N (N rays a sample), ris, restir-di, slc (light cones; slc-card has a graphics card shade them) or
+    /// slc-paper; with -power behind it lights are picked as the paper does. No sun is made up then. Without it what emits is seen, but lights nothing.
     #[arg(long, value_name = "METHOD")]
     pub(crate) direct_light: Option<DirectLight>,
-    /// Steps at 15 Hz that lead to the picture, for methods that remember (restir-di, slc, slc-paper).
+    /// Steps at 15 Hz that lead to the picture, for methods that remember (restir-di and those of cones).
     #[arg(long, value_name = "N", default_value_t = 16, requires = "direct_light")]
     pub(crate) light_steps: u32,
     /// Light from all around: an equirectangular Radiance picture. Its middle lies towards −Z.

@@ -7,6 +7,7 @@ use std::path::Path;
 
 use common::command::{fail, files, partial_files, png_size, succeed};
 use common::made;
+use dapple_gpu::testing::gpu_for_tests;
 use dapple_scene::{NoFiles, builtin, load};
 use tempfile::TempDir;
 
@@ -224,6 +225,14 @@ fn area_lights_light_a_picture() {
     for method in ["slc", "slc-power", "slc-paper", "ris", "restir-di"] {
         let found = render("other.png", &["--direct-light", method]);
         assert!((found - rays).abs() < 0.1 * rays, "{method}: {found}, by rays {rays}");
+    }
+    if gpu_for_tests().is_some() {
+        let [card, twin] = ["slc-card", "slc"].map(|method| {
+            render("of.png", &["--direct-light", method]);
+            image::open(at.join("of.png")).unwrap().to_rgb8().into_raw()
+        });
+        let off = card.iter().zip(&twin).filter(|(a, b)| a.abs_diff(**b) > 1).count();
+        assert!(off * 500 < twin.len(), "{off} of {} bytes differ", twin.len());
     }
     let lit = render("sky.png", &["--direct-light", "rt-16", "--environment", "sky.hdr"]);
     assert!(lit > rays + 5.0, "{lit}, without a sky {rays}");

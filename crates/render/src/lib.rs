@@ -19,6 +19,8 @@ mod noise;
 mod obscurance;
 mod preset;
 mod projection;
+#[cfg(feature = "gpu")]
+mod tables;
 #[cfg(test)]
 mod testing;
 

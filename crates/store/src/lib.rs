@@ -7,5 +7,5 @@ pub mod cells;
 pub mod charts;
 pub mod cones;
 pub mod light_visibility;
-mod octahedral;
+pub mod octahedral;
 pub mod points;

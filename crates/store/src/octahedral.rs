@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 
 /// A unit vector as a place in the square −1 … 1, at the octahedron's point that it passes. A vector without a direction becomes +Z.
-pub(crate) fn flatten(normal: Vec3) -> Vec2 {
+pub fn flatten(normal: Vec3) -> Vec2 {
     let sum = normal.x.abs() + normal.y.abs() + normal.z.abs();
     if sum.is_nan() || sum <= 0.0 {
         return Vec2::ZERO;
@@ -13,7 +13,7 @@ pub(crate) fn flatten(normal: Vec3) -> Vec2 {
 }
 
 /// The unit vector at a place in the square.
-pub(crate) fn unflatten(p: Vec2) -> Vec3 {
+pub fn unflatten(p: Vec2) -> Vec3 {
     let z = 1.0 - p.x.abs() - p.y.abs();
     let xy = if z < 0.0 { fold(p) } else { p };
     Vec3::new(xy.x, xy.y, z).normalize()

@@ -1,5 +1,6 @@
 //! Direct light of area lights by every method that can be compared, on the same pictures, with the same rays, lights and materials.
 
+mod card;
 pub(crate) mod picture;
 
 use anyhow::Result;
@@ -11,12 +12,17 @@ use dapple_scene::area_lights::{AreaLights, MAX_LIGHT_TRIANGLES, Pick};
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Pose, PosedCamera, Projection, Scene, ShadingPoint};
 use dapple_server::cones::{ConeServer, ConeStep, Now, cone_charts};
-use dapple_store::cones::{BoundingEntry, CacheCounts, CacheParams, Charting, LookUp, MomentEntry, View};
+use dapple_store::cones::{
+    BoundingEntry, CacheCounts, CacheParams, Charting, ConeEntry, EntryId, EntrySite, LookUp, MomentEntry,
+    PixelPlace, View,
+};
 use dapple_trace::direct::{
     DirectParams, NO_PIXEL, Restir, RestirParams, RestirView, RisParams, Sequence, trace_direct, trace_ris,
 };
 use dapple_trace::slc::Update;
 use dapple_trace::slc::{PaperParams, SlcParams};
+
+use self::card::Card;
 
 /// Steps a second of what remembers earlier frames.
 pub(crate) const STEPS_HZ: f64 = 15.0;
@@ -80,6 +86,8 @@ pub(crate) struct OurCones {
     pub(crate) shading: SlcShading,
     /// Whether light of one light is shaded by that light's own shape.
     pub(crate) shapes: bool,
+    /// Whether a graphics card shades them.
+    pub(crate) on_card: bool,
 }
 
 impl Technique {
@@ -95,7 +103,7 @@ impl Technique {
 
     pub(crate) fn cones() -> Technique {
         let (params, shading) = (SlcParams::default(), SlcShading::default());
-        Technique::Cones(OurCones { params, shading, shapes: true })
+        Technique::Cones(OurCones { params, shading, shapes: true, on_card: false })
     }
 
     /// Our cones, sampled otherwise.
@@ -158,7 +166,7 @@ pub(crate) enum Lighter {
     Ris { sampler: Sampler, frame: u64 },
     Restir(Box<Reservoirs>),
     Paper(Box<(ConeServer<BoundingEntry>, PaperParams, LookUp)>),
-    Cones(Box<(ConeServer<MomentEntry>, OurCones)>),
+    Cones(Box<Cones>),
 }
 
 impl Lighter {
@@ -176,10 +184,11 @@ impl Lighter {
             Technique::PaperCones { params, look_up } => {
                 Lighter::Paper(Box::new((ConeServer::new(CacheParams::default(), look_up)?, params, look_up)))
             }
-            Technique::Cones(cones) => Lighter::Cones(Box::new((
-                ConeServer::new(CacheParams::default(), cones.shading.look_up)?,
-                cones,
-            ))),
+            Technique::Cones(how) => Lighter::Cones(Box::new(Cones {
+                server: ConeServer::new(CacheParams::default(), how.shading.look_up)?,
+                how,
+                card: how.on_card.then(Card::new).transpose()?,
+            })),
         })
     }
 
@@ -193,7 +202,7 @@ impl Lighter {
         matches!(self, Lighter::Paper(_) | Lighter::Cones(_))
     }
 
-    /// Radiance of every pixel of every viewer. `pass` is called after each stage with its name.
+    /// Radiance of every pixel of every viewer. `pass` is called after each stage with its name. Only a graphics card fails.
     pub(crate) fn light(
         &mut self,
         now: &Now<'_>,
@@ -201,8 +210,8 @@ impl Lighter {
         seen: &[Seen],
         charting: &Charting,
         pass: &mut dyn FnMut(&'static str),
-    ) -> (Vec<Vec<Vec3>>, Cost) {
-        match self {
+    ) -> Result<(Vec<Vec<Vec3>>, Cost)> {
+        Ok(match self {
             Lighter::Rays { samples, sampler, frame } => {
                 let (pick, sequence) = sampler.parts();
                 let mut rays = 0;
@@ -251,15 +260,30 @@ impl Lighter {
                     samples: Samples::Fixed(16),
                     ..SlcShading::default()
                 };
-                with_cones(server, now, None, seen, charting, params, &shading, pass)
+                with_cones(server, now, seen, charting, params, pass, |server, pixels| {
+                    Ok(shade_all(&cone_light(server, None), seen, pixels, &shading))
+                })?
             }
             Lighter::Cones(of) => {
-                let (server, OurCones { params, shading, shapes }) = &mut **of;
+                let Cones { server, how: OurCones { params, shading, shapes, .. }, card } = &mut **of;
                 let table = shapes.then(|| AreaLightTable::new(lights));
-                with_cones(server, now, table.as_ref(), seen, charting, params, shading, pass)
+                with_cones(server, now, seen, charting, params, pass, |server, pixels| {
+                    let light = cone_light(server, table.as_ref());
+                    match card {
+                        Some(card) => card.shade_all(&light, seen, pixels, shading),
+                        None => Ok(shade_all(&light, seen, pixels, shading)),
+                    }
+                })?
             }
-        }
+        })
     }
+}
+
+/// Our cones at work.
+pub(crate) struct Cones {
+    server: ConeServer<MomentEntry>,
+    how: OurCones,
+    card: Option<Card>,
 }
 
 /// What ReSTIR remembers of all viewers.
@@ -318,17 +342,19 @@ fn previous_pixels(now: &Now<'_>, pose: &Pose, camera: &PosedCamera, gbuffer: &G
     })
 }
 
-#[expect(clippy::too_many_arguments, reason = "what one frame of all viewers is made of")]
-fn with_cones<E: Update + Caps>(
+/// Where the pixels of each viewer lie in the charts.
+type Places = [Vec<Option<PixelPlace>>];
+
+/// Brings the cones that viewers see up to date, and has them shaded.
+fn with_cones<E: Update>(
     server: &mut ConeServer<E>,
     now: &Now<'_>,
-    lights: Option<&AreaLightTable>,
     seen: &[Seen],
     charting: &Charting,
     params: &E::Params,
-    shading: &SlcShading,
     pass: &mut dyn FnMut(&'static str),
-) -> (Vec<Vec<Vec3>>, Cost) {
+    shade: impl FnOnce(&ConeServer<E>, &Places) -> Result<Vec<Vec<Vec3>>>,
+) -> Result<(Vec<Vec<Vec3>>, Cost)> {
     let pixels: Vec<_> = seen
         .iter()
         .map(|seen| pixel_places(now.scene, now.pose, &seen.camera, &seen.gbuffer, &seen.points, charting))
@@ -340,16 +366,26 @@ fn with_cones<E: Update + Caps>(
         .map(|(seen, pixels)| View { width: seen.gbuffer.width_samples() as usize, pixels })
         .collect();
     let step = server.step(now, &views, params, pass);
-    let pictures = seen
-        .iter()
-        .zip(&pixels)
-        .map(|(seen, pixels)| {
-            let light = ConeLight { cache: server.cache(), place_of: |id| server.place_of(id), lights };
-            shade_cones(&light, &seen.points, pixels, shading)
-        })
-        .collect();
+    let pictures = shade(server, &pixels)?;
     pass("shading");
-    (pictures, Cost { rays: step.counts.rays, step: Some(step), memory: Some(server.cache().counts()) })
+    Ok((pictures, Cost { rays: step.counts.rays, step: Some(step), memory: Some(server.cache().counts()) }))
+}
+
+fn cone_light<'a, E: Update>(
+    server: &'a ConeServer<E>,
+    lights: Option<&'a AreaLightTable>,
+) -> ConeLight<'a, E, impl Fn(EntryId) -> Option<EntrySite> + Sync + 'a> {
+    ConeLight { cache: server.cache(), place_of: |id| server.place_of(id), lights }
+}
+
+fn shade_all<E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite> + Sync>(
+    light: &ConeLight<'_, E, F>,
+    seen: &[Seen],
+    pixels: &Places,
+    shading: &SlcShading,
+) -> Vec<Vec<Vec3>> {
+    let views = seen.iter().zip(pixels);
+    views.map(|(seen, pixels)| shade_cones(light, &seen.points, pixels, shading)).collect()
 }
 
 /// The truth: so many samples a pixel.

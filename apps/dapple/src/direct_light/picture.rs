@@ -33,8 +33,9 @@ impl FromStr for DirectLight {
             "restir-di" => Technique::Restir { sampler, unbiased: false },
             "slc-paper" => Technique::paper_cones(sampler),
             "slc" => Technique::cones().with_sampler(sampler),
+            "slc-card" => Technique::cones().with_sampler(sampler).changed(|cones| cones.on_card = true),
             _ => Technique::rays(
-                rays.ok_or("write rt-N (N rays a sample, 1 to 65536), ris, restir-di, slc-paper or slc, each also with -power")?,
+                rays.ok_or("write rt-N (N rays a sample, 1 to 65536), ris, restir-di, slc-paper, slc or slc-card, each also with -power")?,
                 sampler,
             ),
         };
@@ -79,7 +80,7 @@ pub(crate) fn add(
         let lights = now.lights(&pose);
         // Places on surfaces are those of the picture, wherever they were.
         let seen = [Seen::of(&now, *camera, drawn.gbuffer.clone())];
-        let (mut pictures, _) = lighter.light(&now, &lights, &seen, &charting, &mut |_| ());
+        let (mut pictures, _) = lighter.light(&now, &lights, &seen, &charting, &mut |_| ())?;
         let found = pictures.swap_remove(0);
         if step + 1 == steps {
             for ((direct, lit), point) in drawn.shaded.direct.iter_mut().zip(&found).zip(&seen[0].points) {

@@ -1,4 +1,4 @@
-//! What a surface reflects of one cone of light whose irradiance on it is known: the twin of `area_gloss` in `reflect.wgsl`.
+//! What a surface reflects of one cone of light whose irradiance on it is known: the twin of `gloss.wgsl`.
 
 use std::f32::consts::FRAC_1_PI;
 

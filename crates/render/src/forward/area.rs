@@ -4,10 +4,10 @@ use dapple_gpu::{Gpu, wgpu};
 
 use super::ForwardError;
 use super::atlas::{AtlasBand, AtlasTexture};
-use super::tables::{float_table, write_rows};
 use crate::area_lights::table::TABLE_WIDTH;
 use crate::area_lights::{AreaLightTable, MAX_AREA_LIGHTS};
 use crate::psao::atlas::{LIGHTS_A_TEXEL, PLANES_WITH_LEANS};
+use crate::tables::{float_table, write_rows};
 
 /// What `reflect.wgsl` reads.
 #[derive(Debug)]

@@ -16,7 +16,6 @@ mod pipelines;
 mod points;
 mod scene;
 mod shadow;
-mod tables;
 #[cfg(test)]
 mod tests;
 mod uniforms;

@@ -30,6 +30,7 @@ pub(super) fn forward_module(lookup: &Lookup) -> String {
         include_str!("wgsl/brdf.wgsl"),
         include_str!("wgsl/light.wgsl"),
         include_str!("../area_lights/arrival.wgsl"),
+        include_str!("../area_lights/gloss.wgsl"),
         include_str!("../area_lights/reflect.wgsl"),
         include_str!("wgsl/fragment.wgsl"),
         include_str!("wgsl/inspect.wgsl"),

@@ -9,7 +9,7 @@ use super::{Blending, Caps, ConeLight, SeenPart, SlcShading};
 use crate::area_lights::{Arrival, ROUGH_ALPHA, Surface};
 
 /// Part of a light from which on its highlight is that of all of it: nothing is seen of what lacks.
-const WHOLE: f32 = 0.97;
+pub(super) const WHOLE: f32 = 0.97;
 
 /// Most entries that a sample reads.
 const ENTRIES: usize = 4;

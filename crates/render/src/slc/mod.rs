@@ -10,6 +10,8 @@ mod blend;
 #[cfg(test)]
 mod blend_tests;
 mod cap;
+#[cfg(feature = "gpu")]
+pub mod card;
 mod places;
 #[cfg(test)]
 mod tests;

@@ -5,8 +5,8 @@ use dapple_gpu::{Gpu, wgpu};
 use dapple_scene::{Mesh, Pose, Scene};
 
 use super::super::ForwardError;
-use super::super::tables::{float_table, write_rows};
 use super::super::uniforms::{DEFORM_WIDTH, POSE_WIDTH, RIGID, rows};
+use crate::tables::{float_table, write_rows};
 
 /// Texel numbers are handed on as floats, which are exact up to here.
 const MAX_TEXELS: usize = 1 << 24;

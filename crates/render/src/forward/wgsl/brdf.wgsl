@@ -2,14 +2,6 @@
 
 const DIELECTRIC_F0: f32 = 0.04;
 const SMALLEST_ALPHA: f32 = 2e-3;
-const FRAC_1_PI: f32 = 0.31830987;
-
-struct Reflectance {
-    diffuse: vec3<f32>,
-    f0: vec3<f32>,
-    // Squared perceptual roughness.
-    alpha: f32,
-}
 
 fn reflectance(base_color: vec3<f32>, metallic: f32, roughness: f32) -> Reflectance {
     return Reflectance(
@@ -65,9 +57,4 @@ fn ambient_reflected(r: Reflectance, normal: vec3<f32>, to_viewer: vec3<f32>) ->
 
 fn ambient_radiance(direction_world: vec3<f32>) -> vec3<f32> {
     return mix(frame.ambient_ground, frame.ambient_sky, 0.5 + 0.5 * direction_world.y);
-}
-
-fn fifth_power(x: f32) -> f32 {
-    let x2 = x * x;
-    return x2 * x2 * x;
 }

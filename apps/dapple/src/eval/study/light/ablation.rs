@@ -103,7 +103,7 @@ impl LightAblation {
                 let mut last = Quality::default();
                 for update in 1..=self.updates {
                     let watched = update + 4 > self.updates;
-                    let picture = run.step(now, lights, &seen, &lit.charting, watched).remove(0);
+                    let picture = run.step(now, lights, &seen, &lit.charting, watched)?.remove(0);
                     if update == self.updates
                         || (PLOTTED.contains(&name.as_str()) && update.is_power_of_two())
                     {
@@ -174,7 +174,7 @@ impl LightAblation {
                 let steps = if run.lighter.is_stateless() { 1 } else { 16 };
                 let mut picture = Vec::new();
                 for _ in 0..steps {
-                    picture = run.step(&now, &lights, &seen, &charting, false).remove(0);
+                    picture = run.step(&now, &lights, &seen, &charting, false)?.remove(0);
                 }
                 let mut q = Quality::default();
                 q.add(size, &truth, &picture)?;
@@ -209,7 +209,7 @@ impl LightAblation {
                     let truth = last.then(|| truth(now, lights, &seen[0], self.truth_samples));
                     for run in runs.iter_mut().filter(|run| last || !run.lighter.is_stateless()) {
                         let watched = step + 4 >= STEPS;
-                        let picture = run.step(now, lights, &seen, &lit.charting, watched).remove(0);
+                        let picture = run.step(now, lights, &seen, &lit.charting, watched)?.remove(0);
                         if let Some(truth) = &truth {
                             let mut q = Quality::default();
                             q.add(size, truth, &picture)?;

@@ -75,7 +75,7 @@ impl Run {
         seen: &[Seen],
         charting: &Charting,
         watched: bool,
-    ) -> Vec<Vec<Vec3>> {
+    ) -> Result<Vec<Vec<Vec3>>> {
         let (mut last, mut total) = (Instant::now(), 0.0);
         let stages = &mut self.stages;
         let (pictures, cost) = self.lighter.light(now, lights, seen, charting, &mut |stage| {
@@ -88,12 +88,12 @@ impl Run {
                 }
             }
             last = Instant::now();
-        });
+        })?;
         if watched {
             self.totals.push(total);
         }
         self.cost = cost;
-        pictures
+        Ok(pictures)
     }
 
     fn ms(&self) -> f64 {

@@ -107,7 +107,7 @@ impl Study for LightMethods {
                     for run in &mut runs {
                         // Rays remember nothing.
                         if watched || !run.lighter.is_stateless() {
-                            pictures.push(run.step(now, lights, &seen, &lit.charting, watched).remove(0));
+                            pictures.push(run.step(now, lights, &seen, &lit.charting, watched)?.remove(0));
                         }
                     }
                     if step + 1 == self.steps {

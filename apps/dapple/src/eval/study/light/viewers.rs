@@ -131,7 +131,7 @@ impl LightViewers {
                     // Rays remember nothing: the last step is enough.
                     pictures.push(match run.lighter.is_stateless() && step + 1 < steps {
                         true => Vec::new(),
-                        false => run.step(now, lights, &seen, &lit.charting, watched),
+                        false => run.step(now, lights, &seen, &lit.charting, watched)?,
                     });
                 }
                 if step + 1 < steps {

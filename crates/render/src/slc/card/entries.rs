@@ -1,0 +1,171 @@
+//! The cache as texels: entries in the order of blocks, and a hash table of these. `read.wgsl` reads both.
+//!
+//! An entry is [`ENTRY_TEXELS`] texels of four words. Two say where it is: position and normal; shading normal, and in one word cones, and whether it
+//! has samples and a place. Of each cone two follow: energy and mean cosine; direction, cosine of its angle, part of its light that is seen through it,
+//! and in one word which light that is and what else [`SeenPart`] tells. Normals and directions are octahedral, 16 bits a coordinate.
+
+use dapple_store::cones::{BLOCK_TEXELS, BlockKey, ConeEntry, EntryId, EntrySite, MOST_MOMENT_CONES};
+use dapple_store::octahedral::flatten;
+use glam::Vec3;
+
+use super::super::blend::WHOLE;
+use super::super::{Cap, Caps, ConeLight, SeenPart};
+use super::{CardError, Texel};
+use crate::area_lights::AreaLightTable;
+
+/// Texels of an entry.
+const ENTRY_TEXELS: usize = 2 + 2 * MOST_MOMENT_CONES;
+/// Blocks of a row: as many as WebGL2's narrowest textures hold.
+const BLOCKS_A_ROW: usize = 3;
+/// Texels of a row.
+pub(super) const ROW_TEXELS: usize = BLOCKS_A_ROW * BLOCK_TEXELS * ENTRY_TEXELS;
+/// Places of a row of the hash table, two texels each.
+const HASH_A_ROW: usize = 1024;
+/// Texels of such a row.
+pub(super) const HASH_ROW_TEXELS: usize = 2 * HASH_A_ROW;
+/// How far a block may lie from the place that it hashes to.
+const MOST_PROBES: usize = 64;
+const HAS_SAMPLES: u32 = 0x100;
+const HAS_SITE: u32 = 0x200;
+const IS_WHOLE: u32 = 1 << 31;
+
+const _: () = assert!(ROW_TEXELS <= 2048 && ENTRY_TEXELS == 10);
+
+/// What the card has, or is about to get.
+#[derive(Debug, Default)]
+pub(super) struct Entries {
+    /// Whole rows of [`ROW_TEXELS`].
+    pub(super) texels: Vec<Texel>,
+    /// Rows that the card does not have yet.
+    pub(super) dirty: Vec<bool>,
+    /// The hash table, whole rows of [`HASH_ROW_TEXELS`].
+    pub(super) hash: Vec<Texel>,
+    /// Whether the card lacks it.
+    pub(super) is_hash_dirty: bool,
+}
+
+impl Entries {
+    /// Takes over the entries that have a place now. Those of other blocks stay as they were: nobody finds them.
+    pub(super) fn take<E, F>(
+        &mut self,
+        light: &ConeLight<'_, E, F>,
+        most_rows: usize,
+    ) -> Result<(), CardError>
+    where
+        E: ConeEntry + Caps,
+        F: Fn(EntryId) -> Option<EntrySite>,
+    {
+        let mut blocks: Vec<(BlockKey, u32)> = Vec::new();
+        let mut entry_texels = [Texel::default(); ENTRY_TEXELS];
+        for id in light.cache.ids() {
+            let Some((site, entry)) = (light.place_of)(id).zip(light.cache.entry(id)) else { continue };
+            let Some(key) = light.cache.key(id) else { continue };
+            let block = id.index() / BLOCK_TEXELS;
+            if blocks.last().is_none_or(|(last, _)| *last != key.block) {
+                blocks.push((key.block, block as u32));
+                self.reserve(block, most_rows)?;
+            }
+            write(&mut entry_texels, &site, entry, light.lights);
+            let row = block / BLOCKS_A_ROW;
+            let first = row * ROW_TEXELS
+                + (block % BLOCKS_A_ROW * BLOCK_TEXELS + usize::from(key.texel)) * ENTRY_TEXELS;
+            let held = &mut self.texels[first..first + ENTRY_TEXELS];
+            if held != entry_texels {
+                held.copy_from_slice(&entry_texels);
+                self.dirty[row] = true;
+            }
+        }
+        let hash = hash_table(&blocks);
+        self.is_hash_dirty |= hash != self.hash;
+        self.hash = hash;
+        Ok(())
+    }
+
+    /// Makes room for a block.
+    fn reserve(&mut self, block: usize, most_rows: usize) -> Result<(), CardError> {
+        let rows = block / BLOCKS_A_ROW + 1;
+        if rows > most_rows {
+            return Err(CardError::Blocks { found: block + 1, most: most_rows * BLOCKS_A_ROW });
+        }
+        if rows > self.dirty.len() {
+            self.texels.resize(rows * ROW_TEXELS, Texel::default());
+            self.dirty.resize(rows, true);
+        }
+        Ok(())
+    }
+}
+
+fn write<E: ConeEntry + Caps>(
+    out: &mut [Texel; ENTRY_TEXELS],
+    site: &EntrySite,
+    entry: &E,
+    lights: Option<&AreaLightTable>,
+) {
+    *out = [Texel::default(); ENTRY_TEXELS];
+    let mut count = 0;
+    entry.each_cap(|cap, seen| {
+        if let Some(texels) = out[2..].as_chunks_mut::<2>().0.get_mut(count) {
+            *texels = cone_texels(&cap, seen, lights);
+            count += 1;
+        }
+    });
+    let has_samples = if entry.confidence() > 0 { HAS_SAMPLES } else { 0 };
+    let [x, y, z] = site.position_world.to_array().map(f32::to_bits);
+    out[0] = [x, y, z, octahedral(site.normal_world)];
+    out[1] = [octahedral(site.normal_shading_world), count as u32 | has_samples | HAS_SITE, 0, 0];
+}
+
+fn cone_texels(cap: &Cap, seen: Option<SeenPart>, lights: Option<&AreaLightTable>) -> [Texel; 2] {
+    let [r, g, b] = cap.energy.to_array().map(f32::to_bits);
+    let of_light = seen.and_then(|seen| Some((seen, lights?.slot_of_form(seen.light)?)));
+    let (fraction, light) = of_light.map_or((0.0, 0), |(seen, slot)| {
+        let settled = (seen.settled.clamp(0.0, 1.0) * 32767.0 + 0.5) as u32;
+        let whole = if seen.of_all >= WHOLE { IS_WHOLE } else { 0 };
+        (seen.fraction, (slot as u32 + 1) | settled << 16 | whole)
+    });
+    [
+        [r, g, b, cap.mean_cosine.to_bits()],
+        [octahedral(cap.direction), cap.cos_angle.to_bits(), fraction.to_bits(), light],
+    ]
+}
+
+/// A unit vector in a word, for `unpack2x16snorm`.
+fn octahedral(direction: Vec3) -> u32 {
+    let p = flatten(direction) * f32::from(i16::MAX);
+    let [x, y] = p.to_array().map(|v| u32::from(libm::roundf(v) as i16 as u16));
+    x | y << 16
+}
+
+/// Blocks and their numbers where `read.wgsl` looks for them: from the place that a key hashes to on, up to the first that is free.
+fn hash_table(blocks: &[(BlockKey, u32)]) -> Vec<Texel> {
+    let mut places = (2 * blocks.len()).next_power_of_two().max(HASH_A_ROW);
+    loop {
+        if let Some(table) = hash_table_of(blocks, places) {
+            return table;
+        }
+        places *= 2;
+    }
+}
+
+/// With so many places, unless one lies too far from its own.
+fn hash_table_of(blocks: &[(BlockKey, u32)], places: usize) -> Option<Vec<Texel>> {
+    let mut table = vec![Texel::default(); 2 * places];
+    for (key, block) in blocks {
+        let first = hashed(key) as usize;
+        let mut at = (0..MOST_PROBES).map(|i| (first + i) & (places - 1));
+        let at = at.find(|at| table[2 * at + 1][2] == 0)?;
+        table[2 * at] = [key.instance, key.chart, i32::from(key.level) as u32, key.slab as u32];
+        table[2 * at + 1] = [key.x as u32, key.y as u32, block + 1, 0];
+    }
+    Some(table)
+}
+
+fn hashed(key: &BlockKey) -> u32 {
+    let words =
+        [key.instance, key.chart, i32::from(key.level) as u32, key.slab as u32, key.x as u32, key.y as u32];
+    let h = words.into_iter().fold(0u32, |h, word| {
+        let x = (h ^ word).wrapping_mul(0x9e37_79b1);
+        x ^ x >> 15
+    });
+    h ^ h >> 16
+}

@@ -1,0 +1,403 @@
+//! The same shading on a graphics card: the twin is [`shade_cones`](super::shade_cones), and takes the same.
+//!
+//! - takes: a device, a cache with its entries' places and the lights' shapes, once for all viewers of a moment; then the samples of each
+//!   viewer
+//! - returns: a texture of outgoing radiance, in rows from the top
+//!
+//! Entries are found on the card, by a hash table of blocks; only those that changed are sent to it. Fragments and textures alone, as WebGL2 has them.
+
+mod entries;
+mod samples;
+#[cfg(test)]
+mod tests;
+
+use bytemuck::{Pod, Zeroable};
+use dapple_gpu::{Gpu, ReadError, join, read_texture, shader_module, wgpu};
+use dapple_scene::ShadingPoint;
+use dapple_store::cones::{ConeEntry, EntryId, EntrySite, PixelPlace};
+use glam::Vec3;
+
+use self::entries::{Entries, HASH_ROW_TEXELS, ROW_TEXELS};
+use super::{Blending, Caps, ConeLight, Form, Samples, SlcShading};
+use crate::area_lights::MAX_AREA_LIGHTS;
+use crate::area_lights::table::TABLE_WIDTH;
+use crate::tables::{float_table, word_table, write_layer, write_rows};
+
+/// Four words of a table.
+type Texel = [u32; 4];
+
+/// Rows of a layer of entries: no more than WebGL2's textures have.
+const MOST_LAYER_ROWS: usize = 2048;
+
+const OUT_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+
+/// Why cones cannot be shaded on a card.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CardError {
+    /// Radiance is more than a texture of bytes holds.
+    #[error("light cones: this device cannot draw into textures of floats; shade them on the processor")]
+    NoFloats,
+    /// More blocks of entries than textures have room for.
+    #[error(
+        "light cones: the cache has {found} blocks, this device has room for {most}: give the cache less memory"
+    )]
+    Blocks {
+        /// Blocks of the cache, at least.
+        found: usize,
+        /// What there is room for.
+        most: usize,
+    },
+    /// The picture has no pixels, or is larger than textures are, or its samples are not as many as its pixels.
+    #[error(
+        "light cones: {samples} samples are no picture of rows of {width} that this device can draw: sides are 1 to {most}"
+    )]
+    Size {
+        /// Samples there are.
+        samples: usize,
+        /// Samples of a row.
+        width: usize,
+        /// Longest side.
+        most: usize,
+    },
+    /// Nothing came back.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+}
+
+/// What one viewer sees.
+#[derive(Clone, Copy, Debug)]
+pub struct CardView<'a> {
+    /// Samples of a row.
+    pub width: usize,
+    /// Samples, rows from the top: [`crate::shade::shading_points`].
+    pub points: &'a [Option<ShadingPoint>],
+    /// Their places in the charts: [`super::pixel_places`].
+    pub pixels: &'a [Option<PixelPlace>],
+}
+
+/// `ConeParams` of `read.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+struct ConeUniform {
+    bias: f32,
+    mask: u32,
+    directions: i32,
+    flags: u32,
+}
+
+/// Shades cones on a card. Keeps what it sent from moment to moment.
+#[derive(Debug)]
+pub struct ConePass {
+    pipeline: wgpu::RenderPipeline,
+    layout: wgpu::BindGroupLayout,
+    uniform: wgpu::Buffer,
+    lights: wgpu::Texture,
+    entries: Entries,
+    entry_table: wgpu::Texture,
+    hash_table: wgpu::Texture,
+    samples: wgpu::Texture,
+    picture: wgpu::Texture,
+}
+
+impl ConePass {
+    /// Without a cache.
+    ///
+    /// # Errors
+    /// A device that cannot draw floats.
+    pub fn new(gpu: &Gpu) -> Result<ConePass, CardError> {
+        let features = gpu.adapter.get_texture_format_features(OUT_FORMAT);
+        if !features.allowed_usages.contains(wgpu::TextureUsages::RENDER_ATTACHMENT) {
+            return Err(CardError::NoFloats);
+        }
+        let layout = layout(&gpu.device);
+        Ok(ConePass {
+            pipeline: pipeline(&gpu.device, &layout),
+            layout,
+            uniform: gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("cones"),
+                size: size_of::<ConeUniform>() as u64,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
+            lights: float_table(gpu, "lights of cones", TABLE_WIDTH as u32, MAX_AREA_LIGHTS as u32),
+            entries: Entries::default(),
+            entry_table: word_table(gpu, "cones", (ROW_TEXELS as u32, 1, 2)),
+            hash_table: word_table(gpu, "blocks of cones", (HASH_ROW_TEXELS as u32, 1, 1)),
+            samples: word_table(gpu, "samples of cones", (1, 1, samples::LAYERS as u32)),
+            picture: picture(gpu, (1, 1)),
+        })
+    }
+
+    /// Sends what changed of the entries that have a place now, and the lights. Returns the bytes sent.
+    ///
+    /// # Errors
+    /// More blocks than the device's textures hold. Pictures stay as they were.
+    pub fn update<E, F>(&mut self, gpu: &Gpu, light: &ConeLight<'_, E, F>) -> Result<u64, CardError>
+    where
+        E: ConeEntry + Caps,
+        F: Fn(EntryId) -> Option<EntrySite>,
+    {
+        let limits = gpu.device.limits();
+        self.entries.take(light, limits.max_texture_array_layers as usize * MOST_LAYER_ROWS)?;
+        let lights = light.lights.map(|lights| lights.texels()).unwrap_or_default();
+        if !lights.is_empty() {
+            write_rows(gpu, &self.lights, 0, &lights);
+        }
+        Ok(self.send_entries(gpu) + self.send_hash(gpu) + size_of_val(&lights[..]) as u64)
+    }
+
+    fn send_entries(&mut self, gpu: &Gpu) -> u64 {
+        let rows = self.entries.dirty.len();
+        let held = self.entry_table.height() as usize * self.entry_table.depth_or_array_layers() as usize;
+        if rows > held {
+            // Two layers at least: WebGL2 takes one for a plain texture.
+            let layer_rows = rows.div_ceil(2).next_power_of_two().clamp(16, MOST_LAYER_ROWS);
+            let layers = rows.div_ceil(layer_rows).max(2);
+            let size = (ROW_TEXELS as u32, layer_rows as u32, layers as u32);
+            self.entry_table = word_table(gpu, "cones", size);
+            self.entries.dirty.fill(true);
+        }
+        let layer_rows = self.entry_table.height() as usize;
+        let mut sent = 0;
+        let mut row = 0;
+        while row < rows {
+            let layer_end = (row / layer_rows + 1) * layer_rows;
+            let run = self.entries.dirty[row..rows.min(layer_end)].iter().take_while(|dirty| **dirty).count();
+            if run > 0 {
+                let texels = &self.entries.texels[row * ROW_TEXELS..(row + run) * ROW_TEXELS];
+                let (layer, first) = (row / layer_rows, row % layer_rows);
+                write_layer(gpu, &self.entry_table, layer as u32, first as u32, texels);
+                sent += size_of_val(texels) as u64;
+            }
+            row += run.max(1);
+        }
+        self.entries.dirty.fill(false);
+        sent
+    }
+
+    fn send_hash(&mut self, gpu: &Gpu) -> u64 {
+        if !std::mem::take(&mut self.entries.is_hash_dirty) {
+            return 0;
+        }
+        let texels = &self.entries.hash;
+        let rows = (texels.len() / HASH_ROW_TEXELS) as u32;
+        if self.hash_table.height() != rows {
+            self.hash_table = word_table(gpu, "blocks of cones", (HASH_ROW_TEXELS as u32, rows, 1));
+        }
+        write_rows(gpu, &self.hash_table, 0, texels);
+        size_of_val(&texels[..]) as u64
+    }
+
+    /// Records the shading of a view; what it finds is in [`ConePass::picture`], until the next. A submission holds one view: its samples are written
+    /// before all that it holds.
+    ///
+    /// # Errors
+    /// A picture that the device cannot draw. Nothing is recorded then.
+    pub fn draw(
+        &mut self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        view: &CardView<'_>,
+        shading: &SlcShading,
+    ) -> Result<(), CardError> {
+        let size = self.write_samples(gpu, view, shading.look_up.bias)?;
+        let places = self.entries.hash.len() / 2;
+        gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform(shading, places)));
+        let group = self.group(gpu);
+        let target = self.picture.create_view(&wgpu::TextureViewDescriptor::default());
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("cones"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &target,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            ..Default::default()
+        });
+        pass.set_viewport(0.0, 0.0, size.0 as f32, size.1 as f32, 0.0, 1.0);
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        pass.draw(0..3, 0..1);
+        Ok(())
+    }
+
+    /// Outgoing radiance of the last view's samples: red, green, blue, and whether there is a surface.
+    pub fn picture(&self) -> &wgpu::Texture {
+        &self.picture
+    }
+
+    /// Draws and reads back: what [`shade_cones`](super::shade_cones) returns.
+    ///
+    /// # Errors
+    /// A picture that the device cannot draw, or a device that fails.
+    pub async fn shade(
+        &mut self,
+        gpu: &Gpu,
+        view: &CardView<'_>,
+        shading: &SlcShading,
+    ) -> Result<Vec<Vec3>, CardError> {
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.draw(gpu, &mut encoder, view, shading)?;
+        gpu.queue.submit([encoder.finish()]);
+        let bytes = read_texture(gpu, &self.picture, 0).await?;
+        let texels: &[[f32; 4]] = bytemuck::cast_slice(&bytes);
+        Ok(texels.iter().map(|[r, g, b, _]| Vec3::new(*r, *g, *b)).collect())
+    }
+
+    /// Returns columns and rows.
+    fn write_samples(&mut self, gpu: &Gpu, view: &CardView<'_>, bias: f32) -> Result<(u32, u32), CardError> {
+        let (samples, width) = (view.points.len(), view.width);
+        let most = gpu.device.limits().max_texture_dimension_2d as usize;
+        let height = samples.checked_div(width).unwrap_or(0);
+        let fits = (1..=most).contains(&width) && (1..=most).contains(&height);
+        if !fits || width * height != samples || view.pixels.len() != samples {
+            return Err(CardError::Size { samples, width, most });
+        }
+        let size = (width as u32, height as u32);
+        if (self.samples.width(), self.samples.height()) != size {
+            self.samples = word_table(gpu, "samples of cones", (size.0, size.1, samples::LAYERS as u32));
+            self.picture = picture(gpu, size);
+        }
+        let texels = samples::texels(view.points, view.pixels, bias);
+        for (layer, texels) in (0..).zip(texels.chunks_exact(samples)) {
+            write_layer(gpu, &self.samples, layer, 0, texels);
+        }
+        Ok(size)
+    }
+
+    fn group(&self, gpu: &Gpu) -> wgpu::BindGroup {
+        let plain = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let layers = |texture: &wgpu::Texture| {
+            texture.create_view(&wgpu::TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2Array),
+                ..Default::default()
+            })
+        };
+        let views =
+            [layers(&self.samples), plain(&self.hash_table), layers(&self.entry_table), plain(&self.lights)];
+        let mut entries =
+            vec![wgpu::BindGroupEntry { binding: 0, resource: self.uniform.as_entire_binding() }];
+        entries.extend((1..).zip(&views).map(|(binding, view)| wgpu::BindGroupEntry {
+            binding,
+            resource: wgpu::BindingResource::TextureView(view),
+        }));
+        let layout = &self.layout;
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("cones"),
+            layout,
+            entries: &entries,
+        })
+    }
+}
+
+fn uniform(shading: &SlcShading, places: usize) -> ConeUniform {
+    let directions = match shading.samples {
+        Samples::Adaptive => 0,
+        Samples::Fixed(n) => match n {
+            0..4 => 1,
+            4..8 => 4,
+            8..16 => 8,
+            16..64 => 16,
+            64.. => 64,
+        },
+    };
+    let flags = u32::from(shading.look_up.blend)
+        | u32::from(shading.form == Form::Ratio) << 1
+        | u32::from(shading.blending == Blending::Cones) << 2;
+    // Without a block an empty table, of one place or more.
+    ConeUniform { bias: shading.look_up.bias, mask: places.max(1) as u32 - 1, directions, flags }
+}
+
+/// The files of the pass.
+fn module() -> String {
+    join(&[
+        include_str!("../../forward/wgsl/math.wgsl"),
+        include_str!("../../area_lights/arrival.wgsl"),
+        include_str!("../../area_lights/gloss.wgsl"),
+        include_str!("read.wgsl"),
+        include_str!("shade.wgsl"),
+    ])
+}
+
+fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let texture = |sample_type, view_dimension| wgpu::BindingType::Texture {
+        sample_type,
+        view_dimension,
+        multisampled: false,
+    };
+    let words = wgpu::TextureSampleType::Uint;
+    let floats = wgpu::TextureSampleType::Float { filterable: false };
+    let (plain, layers) = (wgpu::TextureViewDimension::D2, wgpu::TextureViewDimension::D2Array);
+    let uniform = wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Uniform,
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    };
+    let types = [
+        uniform,
+        texture(words, layers),
+        texture(words, plain),
+        texture(words, layers),
+        texture(floats, plain),
+    ];
+    let entries: Vec<_> = (0..)
+        .zip(types)
+        .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::FRAGMENT,
+            ty,
+            count: None,
+        })
+        .collect();
+    let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some("cones"), entries: &entries };
+    device.create_bind_group_layout(&descriptor)
+}
+
+fn pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu::RenderPipeline {
+    let module = shader_module(device, "cones", &module());
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("cones"),
+        bind_group_layouts: &[Some(layout)],
+        immediate_size: 0,
+    });
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("cones"),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: Some("cone_vertex"),
+            compilation_options: Default::default(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: None,
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: &module,
+            entry_point: Some("cone_fragment"),
+            compilation_options: Default::default(),
+            targets: &[Some(OUT_FORMAT.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
+
+fn picture(gpu: &Gpu, (width, height): (u32, u32)) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("light of cones"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: OUT_FORMAT,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT
+            | wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    })
+}

@@ -1,0 +1,308 @@
+// What a sample reflects of the cones about it. The twins are `slc::blend` and `slc::cap`, whose constants these are.
+
+// Part of a light from which on its highlight is that of all of it.
+const WHOLE: f32 = 0.97;
+// Part of a cone above an entry's horizon, and mean cosine there, below which it is not taken at its word.
+const LEAST_OPEN: f32 = 0.125;
+const LEAST_COSINE: f32 = 0.01;
+const SMALLEST: f32 = 1.17549435e-38;
+
+// A sample that is lit.
+struct ConePoint {
+    surface: AreaSurface,
+    reflectance: Reflectance,
+    has_gloss: bool,
+    // Metres of an edge of its pixel.
+    footprint: f32,
+}
+
+// What cones bring of what reflectance is made of: n·l (1 − f), D V n·l (1 − f) and D V n·l f, f Schlick's fifth power. Of surfaces without gloss the
+// first is n·l.
+struct Lit {
+    matte: vec3<f32>,
+    gloss: vec3<f32>,
+    grazing: vec3<f32>,
+}
+
+// What several entries see of one light.
+struct Seen {
+    slot: i32,
+    fraction: f32,
+    // Weight of entries that tell, and the last that did.
+    told: f32,
+    teller: i32,
+    moment: vec3<f32>,
+    fluence: f32,
+}
+
+// For how much of a cone the light's own shape stands.
+fn shape_share(cone: Cone, widest: f32) -> f32 {
+    if cone.slot < 0 {
+        return 0.0;
+    }
+    let is_narrow = 1.0 - cone.cos_angle <= widest;
+    if cone.is_whole && is_narrow {
+        return 1.0;
+    }
+    return select(0.0, 1.0 - cone.settled, cone.is_whole || is_narrow);
+}
+
+// 1 − cos a of the widest cone of a part of a light that one cone for all entries stands for.
+fn widest_part(p: ConePoint) -> f32 {
+    if p.reflectance.alpha >= AREA_ROUGH_ALPHA || !p.has_gloss {
+        return 3.0;
+    }
+    let chord = 1.2 * (0.04 + 0.6 * p.reflectance.alpha);
+    return 0.5 * chord * chord;
+}
+
+fn lit_by(p: ConePoint, before: Lit, cone: Cone, site: Site, part: f32) -> Lit {
+    let depth = 1.0 - cone.cos_angle;
+    var count = params.directions;
+    if count == 0 {
+        count = needed_directions(depth, p.reflectance.alpha);
+    }
+    let n = f32(count);
+    let basis = orthonormal_basis(cone.direction);
+    let s = p.surface;
+    let a2 = p.reflectance.alpha * p.reflectance.alpha;
+    let n_dot_v_signed = dot(s.normal, s.to_viewer);
+    let nv = clamp(n_dot_v_signed, 1e-3, 1.0);
+    let lambda_v = sqrt(nv * nv * (1.0 - a2) + a2);
+    var sums = vec3(0.0);
+    // Of the entry: cosines, and directions above its horizon.
+    var over = 0.0;
+    var open = 0.0;
+    var turn = vec2(1.0, 0.0);
+    for (var i = 0; i < count; i++) {
+        let height = select((f32(i) + 0.5) / n, 0.0, count == 1);
+        let below = depth * height;
+        let radius = sqrt(max(below * (2.0 - below), 0.0));
+        let l = cone.direction * (1.0 - below) + basis.tangent * (radius * turn.x) + basis.bitangent * (radius * turn.y);
+        turn = vec2(turn.x * GOLDEN_TURN.x - turn.y * GOLDEN_TURN.y, turn.x * GOLDEN_TURN.y + turn.y * GOLDEN_TURN.x);
+        let cosine = select(0.0, max(dot(site.normal_shading, l), 0.0), dot(site.normal, l) > 0.0);
+        over += cosine;
+        open += select(0.0, 1.0, cosine > 0.0);
+        let shading = dot(s.normal, l);
+        let nl = select(0.0, max(shading, 0.0), dot(s.flat_normal, l) > 0.0);
+        if !p.has_gloss {
+            sums.x += nl;
+            continue;
+        }
+        let vl = dot(s.to_viewer, l);
+        let reciprocal = 1.0 / sqrt(max(2.0 + 2.0 * vl, 1e-6));
+        let vh = clamp((1.0 + vl) * reciprocal, 0.0, 1.0);
+        let nh = clamp((n_dot_v_signed + shading) * reciprocal, 0.0, 1.0);
+        let miss = fifth_power(1.0 - vh);
+        let f = (1.0 - nh) * (1.0 + nh) + nh * nh * a2;
+        let safe = max(nl, 1e-3);
+        let smith = safe * lambda_v + nv * sqrt(safe * safe * (1.0 - a2) + a2);
+        let dv = (0.5 * FRAC_1_PI * a2) * nl / (f * f * smith);
+        sums += vec3(nl * (1.0 - miss), dv * (1.0 - miss), dv * miss);
+    }
+    if (params.flags & CONE_IS_RATIO) == 0u {
+        over = n;
+        open = n;
+    } else {
+        // Light that reached the entry came from above its horizon, wherever rounding puts the cone.
+        over = max(over, LEAST_COSINE * n);
+        open = max(open, LEAST_OPEN * n);
+    }
+    let energy = cone.energy * (part / over);
+    let of_gloss = over / (open * cone.mean_cosine);
+    return Lit(
+        before.matte + energy * sums.x,
+        before.gloss + energy * (of_gloss * sums.y),
+        before.grazing + energy * (of_gloss * sums.z),
+    );
+}
+
+fn reflected_of(p: ConePoint, lit: Lit) -> vec3<f32> {
+    let r = p.reflectance;
+    if !p.has_gloss {
+        return r.diffuse * FRAC_1_PI * lit.matte;
+    }
+    return r.diffuse * (1.0 - r.f0) * FRAC_1_PI * lit.matte + r.f0 * lit.gloss + lit.grazing;
+}
+
+fn luminance(colour: vec3<f32>) -> f32 {
+    return dot(colour, vec3(0.2126, 0.7152, 0.0722));
+}
+
+fn fourth(v: f32) -> f32 {
+    let v2 = v * v;
+    return v2 * v2;
+}
+
+fn reflected_of_cones(p: ConePoint, place: Place) -> vec3<f32> {
+    let found = read_entries(place);
+    let texel = max(p.footprint * params.bias, SMALLEST);
+    // Entries on other faces, or off the plane, see other light.
+    var near = array<f32, 4>(0.0, 0.0, 0.0, 0.0);
+    var plain = array<f32, 4>(0.0, 0.0, 0.0, 0.0);
+    var total = 0.0;
+    var plain_total = 0.0;
+    for (var i = 0; i < found.count; i++) {
+        let site = site_of(found.entry[i]);
+        if !site.is_known {
+            continue;
+        }
+        let facing = fourth(max(dot(p.surface.flat_normal, site.normal), 0.0));
+        let leaning = fourth(max(dot(p.surface.normal, site.normal_shading), 0.0));
+        let off = dot(p.surface.flat_normal, site.position - p.surface.position) / texel;
+        plain[i] = found.weight[i];
+        near[i] = found.weight[i] * facing * facing * leaning / (1.0 + off * off);
+        total += near[i];
+        plain_total += plain[i];
+    }
+    var kept = 0;
+    for (var i = 0; i < found.count; i++) {
+        // Where none is like the place, any is better than darkness.
+        near[i] = select(plain[i] / max(plain_total, SMALLEST), near[i] / max(total, SMALLEST), total > 1e-4 * plain_total);
+        if near[i] > 1e-3 {
+            kept++;
+        } else {
+            near[i] = 0.0;
+        }
+    }
+
+    let each_apart = (params.flags & CONE_EACH_APART) != 0u || kept == 1;
+    let widest = widest_part(p);
+    var lit = Lit(vec3(0.0), vec3(0.0), vec3(0.0));
+    // As many as four entries have cones.
+    var parts: array<Seen, 16>;
+    var used = 0;
+    var mean = vec3(0.0);
+    var heaviest = -1;
+    var most = 0.0;
+    var most_irradiance = vec3(0.0);
+    for (var i = 0; i < found.count; i++) {
+        if near[i] == 0.0 {
+            continue;
+        }
+        let site = site_of(found.entry[i]);
+        var irradiance = vec3(0.0);
+        for (var k = 0; k < site.cones; k++) {
+            var cone = cone_of(found.entry[i], k);
+            let share = shape_share(cone, widest);
+            if share > 0.0 {
+                var at = 0;
+                while at < used && parts[at].slot != cone.slot {
+                    at++;
+                }
+                if at == used {
+                    parts[at] = Seen(cone.slot, 0.0, 0.0, -1, vec3(0.0), 0.0);
+                    used++;
+                }
+                let weight = near[i] * share;
+                parts[at].fraction += weight * cone.fraction;
+                // Entries that see little of the light tell little of where that lies.
+                let fluence = weight * luminance(cone.energy) / cone.mean_cosine;
+                parts[at].fluence += fluence;
+                parts[at].moment += cone.direction * (fluence * 0.5 * (1.0 + cone.cos_angle));
+                if parts[at].teller != i {
+                    parts[at].teller = i;
+                    parts[at].told += weight;
+                }
+            }
+            if share >= 1.0 {
+                continue;
+            }
+            cone.energy *= 1.0 - share;
+            if each_apart {
+                lit = lit_by(p, lit, cone, site, near[i]);
+            } else {
+                let cosine = max(dot(p.surface.normal, cone.direction), 0.0) * 0.5 * (1.0 + cone.cos_angle);
+                irradiance += cone.energy * (cosine / cone.mean_cosine);
+            }
+        }
+        let part = near[i] * luminance(irradiance);
+        mean += irradiance * near[i];
+        if part > most {
+            most = part;
+            most_irradiance = irradiance;
+            heaviest = found.entry[i];
+        }
+    }
+    if heaviest >= 0 {
+        let site = site_of(heaviest);
+        for (var k = 0; k < site.cones; k++) {
+            var cone = cone_of(heaviest, k);
+            let share = shape_share(cone, widest);
+            if share < 1.0 {
+                cone.energy *= 1.0 - share;
+                lit = lit_by(p, lit, cone, site, 1.0);
+            }
+        }
+    }
+    var radiance = reflected_of(p, lit);
+    if heaviest >= 0 {
+        // Not more than four times of what the heaviest of four has, in any colour.
+        radiance *= min(mean / max(most_irradiance, vec3(SMALLEST)), vec3(4.0));
+    }
+    for (var i = 0; i < used; i++) {
+        radiance += reflected_of_light(p, parts[i]);
+    }
+    return radiance;
+}
+
+// By the light's own shape, as much as is seen of it.
+fn reflected_of_light(p: ConePoint, seen: Seen) -> vec3<f32> {
+    let arrived = area_arrival(seen.slot, p.surface.position, p.surface.normal);
+    if all(arrived.irradiance <= vec3(0.0)) {
+        return vec3(0.0);
+    }
+    var direction = arrived.direction;
+    var cos_angle = arrived.cos_angle;
+    let size = length(seen.moment);
+    if size > 0.0 && seen.fraction < WHOLE * seen.told {
+        direction = seen.moment / size;
+        cos_angle = clamp(2.0 * size / seen.fluence - 1.0, -1.0, 1.0);
+    }
+    let reflected = area_gloss(p.reflectance, p.surface, direction, cos_angle, p.has_gloss);
+    return arrived.irradiance * reflected * seen.fraction;
+}
+
+// One triangle over the whole picture.
+@vertex
+fn cone_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
+    let corner = vec2(f32((index << 1u) & 2u), f32(index & 2u));
+    return vec4(corner * 2.0 - 1.0, 0.0, 1.0);
+}
+
+// Layers of `samples`, as `samples.rs` writes them.
+@fragment
+fn cone_fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
+    let at = vec2<i32>(position.xy);
+    let normal = textureLoad(samples, at, 1, 0);
+    // Whether there is a surface, whether it has a place in the charts, and whether it has gloss.
+    let kind = normal.w;
+    if (kind & 1u) == 0u {
+        return vec4(0.0);
+    }
+    let emitted = textureLoad(samples, at, 5, 0);
+    var radiance = bitcast<vec3<f32>>(emitted.xyz);
+    if (kind & 2u) != 0u {
+        let located = textureLoad(samples, at, 0, 0);
+        let shading = textureLoad(samples, at, 2, 0);
+        let viewer = textureLoad(samples, at, 3, 0);
+        let diffuse = textureLoad(samples, at, 4, 0);
+        let chart = textureLoad(samples, at, 6, 0);
+        let texels = textureLoad(samples, at, 7, 0);
+        let f0 = bitcast<vec3<f32>>(vec3(viewer.w, diffuse.w, emitted.w));
+        let surface = AreaSurface(
+            bitcast<vec3<f32>>(located.xyz),
+            bitcast<vec3<f32>>(shading.xyz),
+            bitcast<vec3<f32>>(normal.xyz),
+            bitcast<vec3<f32>>(viewer.xyz),
+        );
+        let reflectance = Reflectance(bitcast<vec3<f32>>(diffuse.xyz), f0, bitcast<f32>(located.w));
+        let footprint = bitcast<f32>(shading.w);
+        let size = vec2<f32>(vec2(chart.z & 0xffffu, chart.z >> 16u));
+        let uv = bitcast<vec2<f32>>(texels.xy);
+        let ratio = params.bias * footprint / bitcast<f32>(chart.w);
+        let place = Place(chart.x, chart.y, uv, bitcast<f32>(texels.z), size, ratio);
+        radiance += reflected_of_cones(ConePoint(surface, reflectance, (kind & 4u) != 0u, footprint), place);
+    }
+    return vec4(radiance, 1.0);
+}
