@@ -8,7 +8,7 @@ use dapple_render::area_lights::AreaLightTable;
 use dapple_render::gbuffer::{GBuffer, rasterize};
 use dapple_render::image::{LinearImage, Rgb8Image, ToneMap};
 use dapple_render::shade::shading_points;
-use dapple_render::slc::{Blending, ConeLight, SlcShading, pixel_places, shade_cones};
+use dapple_render::slc::{Blending, CapTable, ConeLight, SlcShading, pixel_places, shade_cones};
 use dapple_scene::area_lights::Pick;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{NoFiles, PosedCamera, Scene, ShadingPoint, builtin};
@@ -119,7 +119,9 @@ fn measure(stage: &Stage, steps: usize, timed: usize, samples: u32) -> Vec<(&'st
     for _ in 0..steps {
         ways.iter_mut().for_each(|lit| lit.step(stage, &now, Some(&seen)));
     }
-    ways.iter_mut().for_each(|lit| lit.ms.clear());
+    for lit in &mut ways {
+        [&mut lit.ms, &mut lit.server_ms].into_iter().chain(&mut lit.stages).for_each(Vec::clear);
+    }
     let [_, power, best, _] = Rival::all();
     let mut rivals = [power, best];
     for frame in 0..timed as u64 {
@@ -137,6 +139,12 @@ fn measure(stage: &Stage, steps: usize, timed: usize, samples: u32) -> Vec<(&'st
         let quality = stage.quality(&truth, &lit.picture);
         if timed > 0 {
             line(lit.name, &lit.ms, quality);
+            let [places, caps] = &lit.stages;
+            let [all, places, server, caps] = [&lit.ms, places, &lit.server_ms, caps].map(|ms| median(ms));
+            let shading = all - places - server - caps;
+            println!(
+                "  {all:.0} ms: places {places:.0}, server {server:.0}, caps {caps:.0}, shading {shading:.0}"
+            );
         }
         (lit.name, quality)
     });
@@ -277,13 +285,24 @@ struct Lit {
     shapes: bool,
     ms: Vec<f64>,
     server_ms: Vec<f64>,
+    /// Of those: finding places in the charts, and making caps of entries.
+    stages: [Vec<f64>; 2],
     picture: Vec<Vec3>,
 }
 
 impl Lit {
     fn new(name: &'static str, shading: SlcShading, shapes: bool) -> Lit {
         let server = ConeServer::new(CacheParams::default(), shading.look_up).unwrap();
-        Lit { name, server, shading, shapes, ms: Vec::new(), server_ms: Vec::new(), picture: Vec::new() }
+        Lit {
+            name,
+            server,
+            shading,
+            shapes,
+            ms: Vec::new(),
+            server_ms: Vec::new(),
+            stages: [Vec::new(), Vec::new()],
+            picture: Vec::new(),
+        }
     }
 
     /// Without a viewer, the server goes on alone.
@@ -296,12 +315,16 @@ impl Lit {
         let width = stage.size[0] as usize;
         let views: Vec<View<'_>> = pixels.iter().map(|pixels| View { width, pixels }).collect();
         let begun = Instant::now();
+        self.stages[0].push((begun - start).as_secs_f64() * 1e3);
         self.server.step(now, &views, &SlcParams::default(), &mut |_| ());
         self.server_ms.push(begun.elapsed().as_secs_f64() * 1e3);
+        let stepped = Instant::now();
         let table = AreaLightTable::new(&now.lights(now.pose));
         let light = ConeLight { lights: self.shapes.then_some(&table), ..cone_light(&self.server, &table) };
         if let (Some(seen), Some(pixels)) = (seen, pixels) {
-            self.picture = shade_cones(&light, &seen.points, &pixels, &self.shading);
+            let caps = CapTable::new(&light);
+            self.stages[1].push(stepped.elapsed().as_secs_f64() * 1e3);
+            self.picture = shade_cones(&caps, &seen.points, &pixels, &self.shading);
         }
         self.ms.push(start.elapsed().as_secs_f64() * 1e3);
     }

@@ -3,9 +3,9 @@
 use anyhow::{Context, Result};
 use dapple_gpu::Gpu;
 use dapple_render::slc::card::{CardView, ConePass};
-use dapple_render::slc::{ConeLight, SlcShading};
+use dapple_render::slc::{CapTable, SlcShading};
 use dapple_scene::glam::Vec3;
-use dapple_store::cones::{EntryId, EntrySite, MomentEntry};
+use dapple_store::cones::MomentEntry;
 
 use super::{Places, Seen};
 
@@ -25,14 +25,14 @@ impl Card {
     }
 
     /// Radiance of every pixel of every viewer.
-    pub(crate) fn shade_all<F: Fn(EntryId) -> Option<EntrySite>>(
+    pub(crate) fn shade_all(
         &mut self,
-        light: &ConeLight<'_, MomentEntry, F>,
+        table: &CapTable<'_, MomentEntry>,
         seen: &[Seen],
         pixels: &Places,
         shading: &SlcShading,
     ) -> Result<Vec<Vec<Vec3>>> {
-        self.pass.update(&self.gpu, light)?;
+        self.pass.update(&self.gpu, table)?;
         let shade = |(seen, pixels): (&Seen, &Vec<_>)| {
             let view =
                 CardView { width: seen.gbuffer.width_samples() as usize, points: &seen.points, pixels };

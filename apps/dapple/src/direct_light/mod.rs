@@ -7,14 +7,13 @@ use anyhow::Result;
 use dapple_render::area_lights::AreaLightTable;
 use dapple_render::gbuffer::{GBuffer, rasterize};
 use dapple_render::shade::shading_points;
-use dapple_render::slc::{Caps, ConeLight, Form, Samples, SlcShading, pixel_places, shade_cones};
+use dapple_render::slc::{CapTable, Caps, ConeLight, Form, Samples, SlcShading, pixel_places, shade_cones};
 use dapple_scene::area_lights::{AreaLights, MAX_LIGHT_TRIANGLES, Pick};
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Pose, PosedCamera, Projection, Scene, ShadingPoint};
 use dapple_server::cones::{ConeServer, ConeStep, Now, cone_charts};
 use dapple_store::cones::{
-    BoundingEntry, CacheCounts, CacheParams, Charting, ConeEntry, EntryId, EntrySite, LookUp, MomentEntry,
-    PixelPlace, View,
+    BoundingEntry, CacheCounts, CacheParams, Charting, ConeEntry, LookUp, MomentEntry, PixelPlace, View,
 };
 use dapple_trace::direct::{
     DirectParams, NO_PIXEL, Restir, RestirParams, RestirView, RisParams, Sequence, trace_direct, trace_ris,
@@ -261,17 +260,17 @@ impl Lighter {
                     ..SlcShading::default()
                 };
                 with_cones(server, now, seen, charting, params, pass, |server, pixels| {
-                    Ok(shade_all(&cone_light(server, None), seen, pixels, &shading))
+                    Ok(shade_all(&cap_table(server, None), seen, pixels, &shading))
                 })?
             }
             Lighter::Cones(of) => {
                 let Cones { server, how: OurCones { params, shading, shapes, .. }, card } = &mut **of;
                 let table = shapes.then(|| AreaLightTable::new(lights));
                 with_cones(server, now, seen, charting, params, pass, |server, pixels| {
-                    let light = cone_light(server, table.as_ref());
+                    let caps = cap_table(server, table.as_ref());
                     match card {
-                        Some(card) => card.shade_all(&light, seen, pixels, shading),
-                        None => Ok(shade_all(&light, seen, pixels, shading)),
+                        Some(card) => card.shade_all(&caps, seen, pixels, shading),
+                        None => Ok(shade_all(&caps, seen, pixels, shading)),
                     }
                 })?
             }
@@ -371,21 +370,21 @@ fn with_cones<E: Update>(
     Ok((pictures, Cost { rays: step.counts.rays, step: Some(step), memory: Some(server.cache().counts()) }))
 }
 
-fn cone_light<'a, E: Update>(
+fn cap_table<'a, E: Update + Caps>(
     server: &'a ConeServer<E>,
     lights: Option<&'a AreaLightTable>,
-) -> ConeLight<'a, E, impl Fn(EntryId) -> Option<EntrySite> + Sync + 'a> {
-    ConeLight { cache: server.cache(), place_of: |id| server.place_of(id), lights }
+) -> CapTable<'a, E> {
+    CapTable::new(&ConeLight { cache: server.cache(), place_of: |id| server.place_of(id), lights })
 }
 
-fn shade_all<E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite> + Sync>(
-    light: &ConeLight<'_, E, F>,
+fn shade_all<E: ConeEntry + Caps>(
+    table: &CapTable<'_, E>,
     seen: &[Seen],
     pixels: &Places,
     shading: &SlcShading,
 ) -> Vec<Vec<Vec3>> {
     let views = seen.iter().zip(pixels);
-    views.map(|(seen, pixels)| shade_cones(light, &seen.points, pixels, shading)).collect()
+    views.map(|(seen, pixels)| shade_cones(table, &seen.points, pixels, shading)).collect()
 }
 
 /// The truth: so many samples a pixel.

@@ -1,11 +1,12 @@
 //! One sample's light: of the entries about it, by the shapes of lights that they see and by cones of the rest.
 
 use dapple_scene::ShadingPoint;
-use dapple_store::cones::{ConeEntry, EntryId, EntrySite, MOST_MOMENT_CONES, PixelPlace, Reader, luminance};
+use dapple_store::cones::{ConeEntry, MOST_MOMENT_CONES, PixelPlace, Reader, luminance};
 use glam::Vec3;
 
 use super::cap::{Cap, Ground, Lanes, Lens};
-use super::{Blending, Caps, ConeLight, SeenPart, SlcShading};
+use super::table::{CapTable, TableCap};
+use super::{Blending, Caps, SlcShading};
 use crate::area_lights::{Arrival, ROUGH_ALPHA, Surface};
 
 /// Part of a light from which on its highlight is that of all of it: nothing is seen of what lacks.
@@ -18,27 +19,22 @@ const ENTRIES: usize = 4;
 const PARTS: usize = ENTRIES * MOST_MOMENT_CONES;
 
 /// Reads and shades, for one task.
-pub(super) struct Blender<'a, E, F> {
-    light: &'a ConeLight<'a, E, F>,
+pub(super) struct Blender<'a, E> {
+    table: &'a CapTable<'a, E>,
     shading: &'a SlcShading,
     reader: Reader<'a, E>,
     lanes: Lanes,
+    /// Parts of lights of the sample at hand; those of the one before are left in it.
+    parts: [Seen; PARTS],
 }
 
 /// An entry that a sample reads.
-struct Read<'a, E> {
-    entry: &'a E,
+#[derive(Clone, Copy)]
+struct Read<'a> {
+    caps: &'a [TableCap],
     ground: Ground,
     weight: f32,
 }
-
-impl<E> Clone for Read<'_, E> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<E> Copy for Read<'_, E> {}
 
 /// What several entries see of one light, each by its weight.
 #[derive(Clone, Copy, Default)]
@@ -53,9 +49,10 @@ struct Seen {
     moment: Vec3,
 }
 
-impl<'a, E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite>> Blender<'a, E, F> {
-    pub(super) fn new(light: &'a ConeLight<'a, E, F>, shading: &'a SlcShading) -> Self {
-        Blender { light, shading, reader: Reader::new(light.cache, shading.look_up), lanes: Lanes::new() }
+impl<'a, E: ConeEntry + Caps> Blender<'a, E> {
+    pub(super) fn new(table: &'a CapTable<'a, E>, shading: &'a SlcShading) -> Self {
+        let reader = Reader::new(table.cache, shading.look_up);
+        Blender { table, shading, reader, lanes: Lanes::new(), parts: [Seen::default(); PARTS] }
     }
 
     /// Radiance that a sample reflects towards the viewer.
@@ -63,49 +60,49 @@ impl<'a, E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite>> Blender<'a, E
         let mut reads = [None; ENTRIES];
         let count = self.read(point, pixel, &mut reads);
         let mut lens = Lens::of(point, self.shading, &mut self.lanes);
-        let mut parts = [Seen::default(); PARTS];
+        let parts = &mut self.parts;
         let mut used = 0;
         let mut mean = Vec3::ZERO;
-        let mut heaviest: Option<(f32, Vec3, &Read<'_, E>)> = None;
+        let mut heaviest: Option<(f32, Vec3, &Read<'_>)> = None;
         let each_apart = self.shading.blending == Blending::Cones || count == 1;
         let widest = widest_part(point);
         // The light whose shape stands for a cone, what is seen of it, and for how much of the cone: the rest is the cone's.
-        let shape_of = |cap: &Cap, seen: Option<SeenPart>| {
-            let seen = seen?;
-            let (is_whole, is_narrow) = (seen.of_all >= WHOLE, 1.0 - cap.cos_angle <= widest);
-            let share = match (is_whole, is_narrow) {
+        let shape_of = |cone: &TableCap| {
+            let slot = cone.slot()?;
+            let share = match (cone.is_whole, 1.0 - cone.cap.cos_angle <= widest) {
                 (true, true) => 1.0,
-                (false, false) => return None,
-                _ => 1.0 - seen.settled,
+                (false, false) => 0.0,
+                _ => 1.0 - cone.settled,
             };
-            let slot = self.light.lights?.slot_of_form(seen.light).filter(|_| share > 0.0)?;
-            Some((slot, seen.fraction, share))
+            (share > 0.0).then_some((slot, share))
         };
-        let rest_of = |cap: Cap, seen: Option<SeenPart>| {
-            let share = shape_of(&cap, seen).map_or(0.0, |(.., share)| share);
-            (share < 1.0).then(|| Cap { energy: cap.energy * (1.0 - share), ..cap })
+        let rest_of = |cone: &TableCap| {
+            let share = shape_of(cone).map_or(0.0, |(_, share)| share);
+            (share < 1.0).then(|| Cap { energy: cone.cap.energy * (1.0 - share), ..cone.cap })
         };
         for (teller, read) in (1..).zip(reads[..count].iter().flatten()) {
             let mut irradiance = Vec3::ZERO;
-            read.entry.each_cap(|cap, seen| {
-                if let Some((slot, fraction, share)) = shape_of(&cap, seen) {
+            for cone in read.caps {
+                if let Some((slot, share)) = shape_of(cone) {
                     let at = parts[..used].iter().position(|part| part.slot == slot).unwrap_or(used);
-                    // A sample reads no more cones than there are places.
-                    let Some(part) = parts.get_mut(at) else { return };
-                    used = used.max(at + 1);
-                    part.slot = slot;
-                    part.add(&cap, fraction, read.weight * share);
+                    // A sample reads no more cones of lights than there are places.
+                    let Some(part) = parts.get_mut(at) else { continue };
+                    if at == used {
+                        *part = Seen { slot, ..Seen::default() };
+                        used += 1;
+                    }
+                    part.add(&cone.cap, cone.fraction, read.weight * share);
                     if part.teller != teller {
                         (part.teller, part.told) = (teller, part.told + read.weight * share);
                     }
                 }
-                let Some(cap) = rest_of(cap, seen) else { return };
+                let Some(cap) = rest_of(cone) else { continue };
                 if each_apart {
                     lens.add(&cap, &read.ground, read.weight);
                 } else {
                     irradiance += cap.irradiance(point.normal_shading_world);
                 }
-            });
+            }
             let part = read.weight * luminance(irradiance);
             mean += irradiance * read.weight;
             if part > 0.0 && heaviest.is_none_or(|(most, ..)| part > most) {
@@ -114,11 +111,9 @@ impl<'a, E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite>> Blender<'a, E
         }
         let mut radiance = Vec3::ZERO;
         if let Some((_, irradiance, read)) = heaviest {
-            read.entry.each_cap(|cap, seen| {
-                if let Some(cap) = rest_of(cap, seen) {
-                    lens.add(&cap, &read.ground, 1.0);
-                }
-            });
+            for cap in read.caps.iter().filter_map(rest_of) {
+                lens.add(&cap, &read.ground, 1.0);
+            }
             // Not more than four times of what the heaviest of four has, in any colour.
             radiance = lens.radiance()
                 * (mean / irradiance.max(Vec3::splat(f32::MIN_POSITIVE))).min(Vec3::splat(4.0));
@@ -126,7 +121,7 @@ impl<'a, E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite>> Blender<'a, E
             radiance = lens.radiance();
         }
         if used > 0
-            && let Some(table) = self.light.lights
+            && let Some(table) = self.table.lights
         {
             let surface = Surface::of(point);
             for part in &parts[..used] {
@@ -143,7 +138,7 @@ impl<'a, E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite>> Blender<'a, E
         &mut self,
         point: &ShadingPoint,
         pixel: &PixelPlace,
-        reads: &mut [Option<Read<'a, E>>; ENTRIES],
+        reads: &mut [Option<Read<'a>>; ENTRIES],
     ) -> usize {
         let found = self.reader.read(pixel);
         let texel_m = (pixel.footprint_m * self.shading.look_up.bias).max(f32::MIN_POSITIVE);
@@ -151,15 +146,14 @@ impl<'a, E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite>> Blender<'a, E
         let mut plain = [0.0; ENTRIES];
         let (mut total, mut plain_total) = (0.0, 0.0);
         for &(id, weight) in found.entries() {
-            let Some(site) = (self.light.place_of)(id) else { continue };
-            let Some(entry) = self.light.cache.entry(id) else { continue };
+            let Some((site, caps)) = self.table.get(id) else { continue };
             // Entries on other faces, or off the plane, see other light.
             let facing = fourth(point.normal_world.dot(site.normal_world).max(0.0));
             let leaning = fourth(point.normal_shading_world.dot(site.normal_shading_world).max(0.0));
             let off = point.normal_world.dot(site.position_world - point.position_world) / texel_m;
             let near = weight * (facing * facing) * leaning / (1.0 + off * off);
             let ground = Ground { normal: site.normal_world, normal_shading: site.normal_shading_world };
-            reads[count] = Some(Read { entry, ground, weight: near });
+            reads[count] = Some(Read { caps, ground, weight: near });
             plain[count] = weight;
             total += near;
             plain_total += weight;

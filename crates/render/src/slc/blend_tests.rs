@@ -76,7 +76,7 @@ fn shaded_after(
     assert_eq!(cache.update(&queue, update), Ok(4));
     let site = EntrySite { position_world: Vec3::ZERO, normal_world: Vec3::Y, normal_shading_world: Vec3::Y };
     let light = ConeLight { cache: &cache, place_of: |_| Some(site), lights };
-    shade_cones(&light, &[Some(*point)], &pixels, &SlcShading::default())[0]
+    shade_cones(&CapTable::new(&light), &[Some(*point)], &pixels, &SlcShading::default())[0]
 }
 
 fn by_shape(point: &ShadingPoint, table: &AreaLightTable) -> Vec3 {

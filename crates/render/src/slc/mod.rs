@@ -1,7 +1,7 @@
 //! Shades what a viewer sees with light cones of the on-surface cache ([Stadlbauer2023] sec. 3.2, in the ratio form).
 //!
 //! - takes: shading points ([`crate::shade::shading_points`]) and places in the charts ([`pixel_places`]) of all samples, a [`ConeCache`], where
-//!   its entries are in the world, the lights' shapes
+//!   its entries are in the world, the lights' shapes; all but the first two as a [`CapTable`], for all viewers
 //! - returns: outgoing radiance of each sample, emission and direct light
 //!
 //! No ray is traced: visibility is in the cones. Equations in `README.md`.
@@ -13,19 +13,19 @@ mod cap;
 #[cfg(feature = "gpu")]
 pub mod card;
 mod places;
+mod table;
 #[cfg(test)]
 mod tests;
 
 use dapple_scene::ShadingPoint;
-use dapple_store::cones::{
-    BoundingEntry, ConeCache, ConeEntry, EntryId, EntrySite, LookUp, MomentEntry, PixelPlace,
-};
+use dapple_store::cones::{BoundingEntry, ConeCache, ConeEntry, LookUp, MomentEntry, PixelPlace};
 use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::area_lights::AreaLightTable;
 pub use cap::{Cap, Form, Samples};
 pub use places::pixel_places;
+pub use table::CapTable;
 
 /// How much a cone is of a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -130,8 +130,8 @@ pub struct ConeLight<'a, E, F> {
 ///
 /// # Panics
 /// If the lists differ in length.
-pub fn shade_cones<E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite> + Sync>(
-    light: &ConeLight<'_, E, F>,
+pub fn shade_cones<E: ConeEntry + Caps>(
+    table: &CapTable<'_, E>,
     points: &[Option<ShadingPoint>],
     pixels: &[Option<PixelPlace>],
     shading: &SlcShading,
@@ -140,7 +140,7 @@ pub fn shade_cones<E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite> + Sy
     let mut radiance = vec![Vec3::ZERO; points.len()];
     let all = radiance.par_chunks_mut(CHUNK).zip(points.par_chunks(CHUNK)).zip(pixels.par_chunks(CHUNK));
     all.for_each_init(
-        || blend::Blender::new(light, shading),
+        || blend::Blender::new(table, shading),
         |blender, ((radiance, points), pixels)| {
             for ((out, point), pixel) in radiance.iter_mut().zip(points).zip(pixels) {
                 let Some(point) = point else { continue };

@@ -62,13 +62,9 @@ impl<'a> Changes<'a> {
             };
             *moved = bent || then.world_from_mesh != posed.world_from_mesh;
             if *moved && now.scene.instances[i].casts {
-                let bounds = now
-                    .scene
-                    .instance_bounds_world(before.pose, i)
-                    .union(now.scene.instance_bounds_world(now.pose, i));
-                if !bounds.is_empty() {
-                    movers.push((bounds.center(), 0.5 * bounds.diagonal(), i as u32));
-                }
+                let (then, now) = (ball_about(now.scene, before.pose, i), ball_about(now.scene, now.pose, i));
+                let swept = then.zip(now).map(|(then, now)| join(then, now));
+                movers.extend(swept.or(then).or(now).map(|(center, radius)| (center, radius, i as u32)));
             }
         }
         let nothing = !lights.contains(&true) && !moved.contains(&true);
@@ -223,6 +219,22 @@ fn mean_cosine(normal: Vec3, offset: Vec3, radius: f32) -> f32 {
     }
     let above = (cosine + sine).max(0.0);
     above * above / (4.0 * sine.max(f32::MIN_POSITIVE))
+}
+
+/// A ball that holds an instance: about the middle of its box, and no larger than its vertices want it, for it says for whose light rays are sent anew.
+/// `None` where it is not there.
+fn ball_about(scene: &Scene, pose: &Pose, instance: usize) -> Option<(Vec3, f32)> {
+    let bounds = scene.instance_bounds_world(pose, instance);
+    if bounds.is_empty() {
+        return None;
+    }
+    let (center, map) = (bounds.center(), pose.instances[instance].world_from_mesh);
+    let farthest2 = scene
+        .vertex_positions(pose, instance)
+        .iter()
+        .map(|vertex| map.transform_point3(*vertex).distance_squared(center))
+        .fold(0.0, f32::max);
+    Some((center, farthest2.sqrt().min(0.5 * bounds.diagonal())))
 }
 
 /// A ball that holds both.

@@ -2,16 +2,15 @@
 //!
 //! An entry is [`ENTRY_TEXELS`] texels of four words. Two say where it is: position and normal; shading normal, and in one word cones, and whether it
 //! has samples and a place. Of each cone two follow: energy and mean cosine; direction, cosine of its angle, part of its light that is seen through it,
-//! and in one word which light that is and what else [`SeenPart`] tells. Normals and directions are octahedral, 16 bits a coordinate.
+//! and in one word which light that is and what else a [`TableCap`] tells. Normals and directions are octahedral, 16 bits a coordinate.
 
-use dapple_store::cones::{BLOCK_TEXELS, BlockKey, ConeEntry, EntryId, EntrySite, MOST_MOMENT_CONES};
+use dapple_store::cones::{BLOCK_TEXELS, BlockKey, ConeEntry, EntrySite, MOST_MOMENT_CONES};
 use dapple_store::octahedral::flatten;
 use glam::Vec3;
 
-use super::super::blend::WHOLE;
-use super::super::{Cap, Caps, ConeLight, SeenPart};
+use super::super::table::TableCap;
+use super::super::{CapTable, Caps};
 use super::{CardError, Texel};
-use crate::area_lights::AreaLightTable;
 
 /// Texels of an entry.
 const ENTRY_TEXELS: usize = 2 + 2 * MOST_MOMENT_CONES;
@@ -46,26 +45,21 @@ pub(super) struct Entries {
 
 impl Entries {
     /// Takes over the entries that have a place now. Those of other blocks stay as they were: nobody finds them.
-    pub(super) fn take<E, F>(
+    pub(super) fn take<E: ConeEntry + Caps>(
         &mut self,
-        light: &ConeLight<'_, E, F>,
+        table: &CapTable<'_, E>,
         most_rows: usize,
-    ) -> Result<(), CardError>
-    where
-        E: ConeEntry + Caps,
-        F: Fn(EntryId) -> Option<EntrySite>,
-    {
+    ) -> Result<(), CardError> {
         let mut blocks: Vec<(BlockKey, u32)> = Vec::new();
         let mut entry_texels = [Texel::default(); ENTRY_TEXELS];
-        for id in light.cache.ids() {
-            let Some((site, entry)) = (light.place_of)(id).zip(light.cache.entry(id)) else { continue };
-            let Some(key) = light.cache.key(id) else { continue };
+        for (id, site, caps) in table.each() {
+            let Some((key, entry)) = table.cache.key(id).zip(table.cache.entry(id)) else { continue };
             let block = id.index() / BLOCK_TEXELS;
             if blocks.last().is_none_or(|(last, _)| *last != key.block) {
                 blocks.push((key.block, block as u32));
                 self.reserve(block, most_rows)?;
             }
-            write(&mut entry_texels, &site, entry, light.lights);
+            write(&mut entry_texels, site, caps, entry.confidence() > 0);
             let row = block / BLOCKS_A_ROW;
             let first = row * ROW_TEXELS
                 + (block % BLOCKS_A_ROW * BLOCK_TEXELS + usize::from(key.texel)) * ENTRY_TEXELS;
@@ -95,37 +89,28 @@ impl Entries {
     }
 }
 
-fn write<E: ConeEntry + Caps>(
-    out: &mut [Texel; ENTRY_TEXELS],
-    site: &EntrySite,
-    entry: &E,
-    lights: Option<&AreaLightTable>,
-) {
+fn write(out: &mut [Texel; ENTRY_TEXELS], site: &EntrySite, caps: &[TableCap], has_samples: bool) {
     *out = [Texel::default(); ENTRY_TEXELS];
-    let mut count = 0;
-    entry.each_cap(|cap, seen| {
-        if let Some(texels) = out[2..].as_chunks_mut::<2>().0.get_mut(count) {
-            *texels = cone_texels(&cap, seen, lights);
-            count += 1;
-        }
-    });
-    let has_samples = if entry.confidence() > 0 { HAS_SAMPLES } else { 0 };
+    let count = caps.len().min(MOST_MOMENT_CONES);
+    for (texels, cone) in out[2..].as_chunks_mut::<2>().0.iter_mut().zip(caps) {
+        *texels = cone_texels(cone);
+    }
+    let has_samples = if has_samples { HAS_SAMPLES } else { 0 };
     let [x, y, z] = site.position_world.to_array().map(f32::to_bits);
     out[0] = [x, y, z, octahedral(site.normal_world)];
     out[1] = [octahedral(site.normal_shading_world), count as u32 | has_samples | HAS_SITE, 0, 0];
 }
 
-fn cone_texels(cap: &Cap, seen: Option<SeenPart>, lights: Option<&AreaLightTable>) -> [Texel; 2] {
+fn cone_texels(cone: &TableCap) -> [Texel; 2] {
+    let cap = &cone.cap;
     let [r, g, b] = cap.energy.to_array().map(f32::to_bits);
-    let of_light = seen.and_then(|seen| Some((seen, lights?.slot_of_form(seen.light)?)));
-    let (fraction, light) = of_light.map_or((0.0, 0), |(seen, slot)| {
-        let settled = (seen.settled.clamp(0.0, 1.0) * 32767.0 + 0.5) as u32;
-        let whole = if seen.of_all >= WHOLE { IS_WHOLE } else { 0 };
-        (seen.fraction, (slot as u32 + 1) | settled << 16 | whole)
+    let light = cone.slot().map_or(0, |slot| {
+        let settled = (cone.settled * 32767.0 + 0.5) as u32;
+        (slot as u32 + 1) | settled << 16 | if cone.is_whole { IS_WHOLE } else { 0 }
     });
     [
         [r, g, b, cap.mean_cosine.to_bits()],
-        [octahedral(cap.direction), cap.cos_angle.to_bits(), fraction.to_bits(), light],
+        [octahedral(cap.direction), cap.cos_angle.to_bits(), cone.fraction.to_bits(), light],
     ]
 }
 

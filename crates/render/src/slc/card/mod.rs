@@ -1,7 +1,6 @@
 //! The same shading on a graphics card: the twin is [`shade_cones`](super::shade_cones), and takes the same.
 //!
-//! - takes: a device, a cache with its entries' places and the lights' shapes, once for all viewers of a moment; then the samples of each
-//!   viewer
+//! - takes: a device, a [`CapTable`], once for all viewers of a moment; then the samples of each viewer
 //! - returns: a texture of outgoing radiance, in rows from the top
 //!
 //! Entries are found on the card, by a hash table of blocks; only those that changed are sent to it. Fragments and textures alone, as WebGL2 has them.
@@ -14,11 +13,11 @@ mod tests;
 use bytemuck::{Pod, Zeroable};
 use dapple_gpu::{Gpu, ReadError, join, read_texture, shader_module, wgpu};
 use dapple_scene::ShadingPoint;
-use dapple_store::cones::{ConeEntry, EntryId, EntrySite, PixelPlace};
+use dapple_store::cones::{ConeEntry, PixelPlace};
 use glam::Vec3;
 
 use self::entries::{Entries, HASH_ROW_TEXELS, ROW_TEXELS};
-use super::{Blending, Caps, ConeLight, Form, Samples, SlcShading};
+use super::{Blending, CapTable, Caps, Form, Samples, SlcShading};
 use crate::area_lights::MAX_AREA_LIGHTS;
 use crate::area_lights::table::TABLE_WIDTH;
 use crate::tables::{float_table, word_table, write_layer, write_rows};
@@ -132,14 +131,14 @@ impl ConePass {
     ///
     /// # Errors
     /// More blocks than the device's textures hold. Pictures stay as they were.
-    pub fn update<E, F>(&mut self, gpu: &Gpu, light: &ConeLight<'_, E, F>) -> Result<u64, CardError>
-    where
-        E: ConeEntry + Caps,
-        F: Fn(EntryId) -> Option<EntrySite>,
-    {
+    pub fn update<E: ConeEntry + Caps>(
+        &mut self,
+        gpu: &Gpu,
+        table: &CapTable<'_, E>,
+    ) -> Result<u64, CardError> {
         let limits = gpu.device.limits();
-        self.entries.take(light, limits.max_texture_array_layers as usize * MOST_LAYER_ROWS)?;
-        let lights = light.lights.map(|lights| lights.texels()).unwrap_or_default();
+        self.entries.take(table, limits.max_texture_array_layers as usize * MOST_LAYER_ROWS)?;
+        let lights = table.lights.map(|lights| lights.texels()).unwrap_or_default();
         if !lights.is_empty() {
             write_rows(gpu, &self.lights, 0, &lights);
         }

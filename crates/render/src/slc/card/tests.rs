@@ -8,14 +8,14 @@ use dapple_gpu::testing::{
 use dapple_scene::area_lights::AreaLights;
 use dapple_scene::{EmitterShape, Material, Reflectance};
 use dapple_store::cones::{
-    BACK, CacheParams, ChartPlace, ConeCache, LightSet, LookUp, MomentCone, MomentEntry, Requests, SLABS,
-    UpdateQueue, View,
+    BACK, CacheParams, ChartPlace, ConeCache, EntryId, EntrySite, LightSet, LookUp, MomentCone, MomentEntry,
+    Requests, SLABS, UpdateQueue, View,
 };
 use glam::{Affine3A, Vec2};
 
 use super::*;
 use crate::area_lights::AreaLightTable;
-use crate::slc::shade_cones;
+use crate::slc::{ConeLight, shade_cones};
 use crate::testing::{Stage, ground, matte, sphere};
 
 const WIDTH: usize = 64;
@@ -198,9 +198,10 @@ fn the_card_shades_as_the_twin_does() {
         let mut cache = ConeCache::<MomentEntry>::new(CacheParams::default()).unwrap();
         cache_of(&seen, &shading.look_up, &mut cache);
         let light = ConeLight { cache: &cache, place_of: site, lights };
-        let exact = shade_cones(&light, &seen.points, &seen.pixels, &shading);
+        let table = CapTable::new(&light);
+        let exact = shade_cones(&table, &seen.points, &seen.pixels, &shading);
         let mut pass = ConePass::new(&gpu).unwrap();
-        pass.update(&gpu, &light).unwrap();
+        pass.update(&gpu, &table).unwrap();
         let view = CardView { width: WIDTH, points: &seen.points, pixels: &seen.pixels };
         let found = block_on(pass.shade(&gpu, &view, &shading)).unwrap();
         let lit = exact.iter().filter(|v| v.element_sum() > 1e-3).count();
@@ -233,10 +234,11 @@ fn only_what_changed_is_sent_and_the_picture_is_that_of_a_new_pass() {
     for seen in [&seen, &moved] {
         queue = cache_of(seen, &shading.look_up, &mut cache);
         let light = ConeLight { cache: &cache, place_of: site, lights: Some(&lamps) };
-        assert!(pass.update(&gpu, &light).unwrap() > lights);
-        assert_eq!(pass.update(&gpu, &light), Ok(lights), "nothing changed but what is always sent");
+        let table = CapTable::new(&light);
+        assert!(pass.update(&gpu, &table).unwrap() > lights);
+        assert_eq!(pass.update(&gpu, &table), Ok(lights), "nothing changed but what is always sent");
         let mut fresh = ConePass::new(&gpu).unwrap();
-        fresh.update(&gpu, &light).unwrap();
+        fresh.update(&gpu, &table).unwrap();
         assert_eq!(shade(&mut pass, seen), shade(&mut fresh, seen));
     }
     assert!(queue.evicted > 0, "blocks that were used again");
@@ -245,7 +247,7 @@ fn only_what_changed_is_sent_and_the_picture_is_that_of_a_new_pass() {
     assert!(cache.change(id, |entry| *entry = entry_of_one_light()));
     let light = ConeLight { cache: &cache, place_of: site, lights: Some(&lamps) };
     let row = (ROW_TEXELS * size_of::<Texel>()) as u64;
-    assert_eq!(pass.update(&gpu, &light), Ok(lights + row), "the row of one entry");
+    assert_eq!(pass.update(&gpu, &CapTable::new(&light)), Ok(lights + row), "the row of one entry");
     assert_ne!(shade(&mut pass, &moved), before);
 }
 
@@ -277,6 +279,6 @@ fn what_cannot_be_drawn_is_said() {
     let mut cache = ConeCache::<MomentEntry>::new(CacheParams::default()).unwrap();
     cache_of(&seen, &shading.look_up, &mut cache);
     let light = ConeLight { cache: &cache, place_of: site, lights: None };
-    let error = Entries::default().take(&light, 2).unwrap_err();
+    let error = Entries::default().take(&CapTable::new(&light), 2).unwrap_err();
     assert!(matches!(error, CardError::Blocks { most: 6, .. }), "{error}");
 }

@@ -1,12 +1,14 @@
 //! Stages 1 to 3: blocks for what is wanted, the queue of texels to update, and their places ([Stadlbauer2023] sec. 2.1).
 
+use rayon::prelude::*;
+
 use super::super::entry::ConeEntry;
 use super::super::key::{BLOCK_TEXELS, BlockKey, TexelKey};
-use super::requests::{BlockRequest, Requests, TexelPlace, bits};
+use super::requests::{Requests, TexelPlace, bits};
 use super::{Body, ConeCache, EntryId, Head};
 
 /// A texel that some viewer sees.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct QueuedTexel {
     /// Its entry.
     pub id: EntryId,
@@ -61,7 +63,9 @@ impl<E: ConeEntry> ConeCache<E> {
             slots.push(slot);
         }
         let mut victims = None;
-        let mut order = Vec::new();
+        // Each block once, in the order in which they are first asked for, with all that is asked of it.
+        let mut asked: Vec<Asked<'_>> = Vec::new();
+        let mut index_of: Vec<u32> = Vec::new();
         for ((request, places), slot) in blocks().zip(slots) {
             let slot = match slot {
                 Some(slot) => slot as usize,
@@ -73,15 +77,67 @@ impl<E: ConeEntry> ConeCache<E> {
                     }
                 },
             };
-            if self.heads[slot].wanted == 0 {
-                order.push(slot as u32);
+            index_of.resize(self.heads.len(), u32::MAX);
+            let head = &mut self.heads[slot];
+            if head.wanted == 0 {
+                index_of[slot] = asked.len() as u32;
+                asked.push(Asked { slot, requests: Vec::new() });
             }
-            self.place_texels(slot, request, &places[request.first as usize..]);
+            head.wanted |= request.wanted;
+            asked[index_of[slot] as usize].requests.push((request.wanted, &places[request.first as usize..]));
         }
-        for slot in order {
-            self.enqueue(slot as usize, &mut queue);
-        }
+        self.enqueue(&asked, &index_of, &mut queue);
         queue
+    }
+
+    /// Finds the places of wanted texels, lists these, and begins the new ones. Blocks do not look at what becomes of each other.
+    fn enqueue(&mut self, asked: &[Asked<'_>], index_of: &[u32], queue: &mut UpdateQueue) {
+        let begins: Vec<Vec<(usize, E)>> = asked.par_iter().map(|asked| self.begins(asked.slot)).collect();
+        queue.reused = begins.iter().map(|begins| begins.len() as u32).sum();
+        let counts = asked.iter().map(|asked| self.heads[asked.slot].wanted.count_ones() as usize);
+        let counts: Vec<usize> = counts.collect();
+        queue.texels = vec![QueuedTexel::default(); counts.iter().sum()];
+        let mut blocks: Vec<Option<Block<'_, E>>> = asked.iter().map(|_| None).collect();
+        for ((slot, head), body) in self.heads.iter_mut().enumerate().zip(&mut self.bodies) {
+            let index = index_of.get(slot).map_or(usize::MAX, |index| *index as usize);
+            if let Some(block) = blocks.get_mut(index) {
+                *block = Some(Block { slot, head, body });
+            }
+        }
+        let mut left = &mut queue.texels[..];
+        let mut first = 0;
+        let mut jobs = Vec::with_capacity(asked.len());
+        for (((asked, block), begins), count) in asked.iter().zip(blocks).zip(begins).zip(counts) {
+            let (out, rest) = std::mem::take(&mut left).split_at_mut(count);
+            left = rest;
+            let Some(block) = block else { continue };
+            block.head.first_queued = first;
+            first += count as u32;
+            jobs.push((block, asked, begins, out));
+        }
+        let frame = self.frame;
+        jobs.into_par_iter().with_min_len(16).for_each(|(mut block, asked, begins, out)| {
+            let wanted = std::mem::take(&mut block.head.wanted);
+            for (wanted, places) in &asked.requests {
+                block.place_texels(*wanted, places);
+            }
+            debug_assert_eq!(block.head.wanted, wanted, "the sum of what is asked");
+            block.enqueue(begins, frame, out);
+        });
+    }
+
+    /// What new texels of a block begin with, of those that begin with something.
+    fn begins(&self, slot: usize) -> Vec<(usize, E)> {
+        let Head { key, known, wanted, .. } = self.heads[slot];
+        // One look for the whole block is cheaper than many for each texel.
+        let levels = 1..=self.params.reuse_levels as i8;
+        let can_reuse = wanted & !known != 0
+            && levels.flat_map(|k| [-k, k]).any(|k| key.relatives(k).any(|block| self.has_samples(&block)));
+        if !can_reuse {
+            return Vec::new();
+        }
+        let texel_key = |texel: usize| TexelKey { block: key, texel: texel as u8 };
+        bits(wanted & !known).filter_map(|texel| Some((texel, self.begin_with(&texel_key(texel))?))).collect()
     }
 
     /// The block of a key, made if it is not there. `None` if there is no room.
@@ -131,63 +187,6 @@ impl<E: ConeEntry> ConeCache<E> {
         Some(slot)
     }
 
-    /// Takes note of the wanted texels of a block, and of the best place for those that have none yet.
-    fn place_texels(&mut self, slot: usize, request: &BlockRequest, places: &[TexelPlace]) {
-        let (head, body) = (&mut self.heads[slot], &mut self.bodies[slot]);
-        for (texel, place) in bits(request.wanted).zip(places) {
-            let (bit, held) = (1u64 << texel, &mut body.places[texel]);
-            if (head.known | head.wanted) & bit == 0 {
-                *held = *place;
-            } else if (head.known & !head.moved) & bit == 0 {
-                held.improve(place);
-            } else if !held.is_inside() && place.is_inside() {
-                *held = *place;
-                head.moved |= bit;
-            }
-            head.wanted |= bit;
-        }
-    }
-
-    /// Lists the wanted texels of a block, and begins the new ones.
-    fn enqueue(&mut self, slot: usize, queue: &mut UpdateQueue) {
-        let Head { key, known, wanted, moved, .. } = self.heads[slot];
-        self.heads[slot].first_queued = queue.texels.len() as u32;
-        // One look for the whole block is cheaper than many for each texel.
-        let levels = 1..=self.params.reuse_levels as i8;
-        let can_reuse = wanted & !known != 0
-            && levels.flat_map(|k| [-k, k]).any(|k| key.relatives(k).any(|block| self.has_samples(&block)));
-        for texel in bits(wanted) {
-            let is_new = known >> texel & 1 == 0;
-            if is_new {
-                let texel_key = TexelKey { block: key, texel: texel as u8 };
-                let begin = if can_reuse { self.begin_with(&texel_key) } else { None };
-                queue.reused += u32::from(begin.is_some());
-                let body = &mut self.bodies[slot];
-                body.entries[texel] = begin.unwrap_or_default();
-                body.updated[texel] = 0;
-                self.heads[slot].note_samples(texel, &body.entries[texel]);
-            }
-            let body = &mut self.bodies[slot];
-            let last = std::mem::replace(&mut body.wanted[texel], self.frame);
-            let absent = if is_new { 0 } else { self.frame.wrapping_sub(last).saturating_sub(1) };
-            let age = match body.updated[texel] {
-                0 => u32::MAX,
-                updated => self.frame.wrapping_sub(updated),
-            };
-            queue.texels.push(QueuedTexel {
-                id: EntryId::new(slot, texel),
-                instance: key.instance,
-                place: body.places[texel],
-                age,
-                samples: body.entries[texel].confidence(),
-                is_new,
-                moved: moved >> texel & 1 == 1,
-                absent,
-            });
-        }
-        self.heads[slot].known |= wanted;
-    }
-
     /// What a new entry begins with: the entry of the nearest level that has one at its place, finer ones first.
     fn begin_with(&self, key: &TexelKey) -> Option<E> {
         let found = (1..=self.params.reuse_levels).find_map(|steps| {
@@ -218,5 +217,67 @@ impl<E: ConeEntry> ConeCache<E> {
         debug_assert!(texel < BLOCK_TEXELS);
         let body = &self.bodies[slot];
         (self.heads[slot].known >> texel & 1 == 1 && body.updated[texel] != 0).then(|| &body.entries[texel])
+    }
+}
+
+/// A block that is wanted, and what each tile of pixels wants of it.
+struct Asked<'a> {
+    slot: usize,
+    requests: Vec<(u64, &'a [TexelPlace])>,
+}
+
+/// A block at work.
+struct Block<'a, E> {
+    slot: usize,
+    head: &'a mut Head,
+    body: &'a mut Body<E>,
+}
+
+impl<E: ConeEntry> Block<'_, E> {
+    /// Takes note of wanted texels, and of the best place for those that have none yet.
+    fn place_texels(&mut self, wanted: u64, places: &[TexelPlace]) {
+        let (head, body) = (&mut *self.head, &mut *self.body);
+        for (texel, place) in bits(wanted).zip(places) {
+            let (bit, held) = (1u64 << texel, &mut body.places[texel]);
+            if (head.known | head.wanted) & bit == 0 {
+                *held = *place;
+            } else if (head.known & !head.moved) & bit == 0 {
+                held.improve(place);
+            } else if !held.is_inside() && place.is_inside() {
+                *held = *place;
+                head.moved |= bit;
+            }
+            head.wanted |= bit;
+        }
+    }
+
+    /// Lists the wanted texels, and begins the new ones.
+    fn enqueue(&mut self, begins: Vec<(usize, E)>, frame: u32, out: &mut [QueuedTexel]) {
+        let (head, body) = (&mut *self.head, &mut *self.body);
+        let mut begins = begins.into_iter().peekable();
+        for (texel, out) in bits(head.wanted).zip(out) {
+            let is_new = head.known >> texel & 1 == 0;
+            if is_new {
+                let begin = begins.next_if(|(of, _)| *of == texel);
+                body.entries[texel] = begin.map_or_else(E::default, |(_, entry)| entry);
+                body.updated[texel] = 0;
+                head.note_samples(texel, &body.entries[texel]);
+            }
+            let last = std::mem::replace(&mut body.wanted[texel], frame);
+            *out = QueuedTexel {
+                id: EntryId::new(self.slot, texel),
+                instance: head.key.instance,
+                place: body.places[texel],
+                age: match body.updated[texel] {
+                    0 => u32::MAX,
+                    updated => frame.wrapping_sub(updated),
+                },
+                samples: body.entries[texel].confidence(),
+                is_new,
+                moved: head.moved >> texel & 1 == 1,
+                absent: if is_new { 0 } else { frame.wrapping_sub(last).saturating_sub(1) },
+            };
+        }
+        head.known |= head.wanted;
     }
 }

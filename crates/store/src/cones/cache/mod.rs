@@ -11,6 +11,7 @@ mod requests;
 mod tests;
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -280,8 +281,19 @@ impl<E: ConeEntry> ConeCache<E> {
 
     /// All entries that have a place, in an order that depends on what was admitted alone.
     pub fn ids(&self) -> impl Iterator<Item = EntryId> + '_ {
-        let used = self.heads.iter().enumerate().filter(|(_, head)| head.is_used);
-        used.flat_map(|(slot, head)| bits(head.known).map(move |texel| EntryId::new(slot, texel)))
+        self.ids_of_blocks(0..self.heads.len())
+    }
+
+    /// Those of them whose number divided by [`BLOCK_TEXELS`] is in the range.
+    pub fn ids_of_blocks(&self, blocks: Range<usize>) -> impl Iterator<Item = EntryId> + '_ {
+        let slots = blocks.start.min(self.heads.len())..blocks.end.min(self.heads.len());
+        let used = slots.filter(|slot| self.heads[*slot].is_used);
+        used.flat_map(|slot| bits(self.heads[slot].known).map(move |texel| EntryId::new(slot, texel)))
+    }
+
+    /// Above the number of every entry divided by [`BLOCK_TEXELS`].
+    pub fn end_block(&self) -> usize {
+        self.heads.len()
     }
 
     /// Removes the blocks of instances that are not to be kept. What the frame's queue has of them is gone.

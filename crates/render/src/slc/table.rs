@@ -1,0 +1,137 @@
+//! What shading reads of a cache: cones as caps, and where entries are, close together and each made once, however many samples of however many viewers
+//! read it.
+
+use dapple_store::cones::{BLOCK_TEXELS, ConeCache, ConeEntry, EntryId, EntrySite};
+use rayon::prelude::*;
+
+use super::blend::WHOLE;
+use super::{Cap, Caps, ConeLight, SeenPart};
+use crate::area_lights::AreaLightTable;
+
+/// Blocks of a chunk.
+const CHUNK_BLOCKS: usize = 16;
+/// Texels of those.
+const CHUNK_TEXELS: usize = CHUNK_BLOCKS * BLOCK_TEXELS;
+
+/// A cone, and which part of which light that is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TableCap {
+    pub(super) cap: Cap,
+    /// [`SeenPart::fraction`].
+    pub(super) fraction: f32,
+    /// [`SeenPart::settled`].
+    pub(super) settled: f32,
+    /// Place of the light in the table of lights.
+    slot: u16,
+    /// Whether all cones of it together see all of it.
+    pub(super) is_whole: bool,
+}
+
+/// No light of the table.
+const NO_SLOT: u16 = u16::MAX;
+
+impl TableCap {
+    fn new(cap: Cap, seen: Option<SeenPart>, lights: Option<&AreaLightTable>) -> TableCap {
+        let of_light = seen.and_then(|seen| Some((seen, lights?.slot_of_form(seen.light)?)));
+        match of_light {
+            Some((seen, slot)) => TableCap {
+                cap,
+                fraction: seen.fraction,
+                settled: seen.settled.clamp(0.0, 1.0),
+                slot: slot as u16,
+                is_whole: seen.of_all >= WHOLE,
+            },
+            None => TableCap { cap, fraction: 0.0, settled: 0.0, slot: NO_SLOT, is_whole: false },
+        }
+    }
+
+    /// Place of its light in the table of lights, if that shows it by its form.
+    #[inline]
+    pub(super) fn slot(&self) -> Option<usize> {
+        (self.slot != NO_SLOT).then_some(usize::from(self.slot))
+    }
+}
+
+/// Where an entry is, and which of its chunk's caps it has.
+#[derive(Clone, Copy, Debug)]
+struct TableEntry {
+    #[cfg(feature = "gpu")]
+    id: EntryId,
+    site: EntrySite,
+    first: u32,
+    count: u32,
+}
+
+/// Entries of [`CHUNK_BLOCKS`] blocks.
+#[derive(Debug)]
+struct Chunk {
+    entries: Vec<TableEntry>,
+    caps: Vec<TableCap>,
+    /// Place in `entries` of each texel of the blocks; [`NO_PLACE`] where there is none.
+    place_of: Vec<u16>,
+}
+
+const NO_PLACE: u16 = u16::MAX;
+
+// Places are numbered in 16 bits.
+const _: () = assert!(CHUNK_TEXELS < NO_PLACE as usize);
+
+/// Entries of a cache at one moment, ready to be shaded: [`ConeLight`] turned into caps.
+#[derive(Debug)]
+pub struct CapTable<'a, E> {
+    pub(super) cache: &'a ConeCache<E>,
+    pub(super) lights: Option<&'a AreaLightTable>,
+    chunks: Vec<Chunk>,
+}
+
+impl<'a, E: ConeEntry + Caps> CapTable<'a, E> {
+    /// Of all entries that have a place, in parallel in the caller's rayon pool.
+    pub fn new<F: Fn(EntryId) -> Option<EntrySite> + Sync>(light: &ConeLight<'a, E, F>) -> CapTable<'a, E> {
+        let chunk = |number: usize| {
+            let blocks = number * CHUNK_BLOCKS..(number + 1) * CHUNK_BLOCKS;
+            let mut chunk =
+                Chunk { entries: Vec::new(), caps: Vec::new(), place_of: vec![NO_PLACE; CHUNK_TEXELS] };
+            for id in light.cache.ids_of_blocks(blocks) {
+                let Some((site, entry)) = (light.place_of)(id).zip(light.cache.entry(id)) else { continue };
+                let first = chunk.caps.len();
+                entry.each_cap(|cap, seen| chunk.caps.push(TableCap::new(cap, seen, light.lights)));
+                let count = (chunk.caps.len() - first) as u32;
+                chunk.place_of[id.index() % CHUNK_TEXELS] = chunk.entries.len() as u16;
+                chunk.entries.push(TableEntry {
+                    #[cfg(feature = "gpu")]
+                    id,
+                    site,
+                    first: first as u32,
+                    count,
+                });
+            }
+            chunk
+        };
+        let chunks = (0..light.cache.end_block().div_ceil(CHUNK_BLOCKS)).into_par_iter().map(chunk).collect();
+        CapTable { cache: light.cache, lights: light.lights, chunks }
+    }
+
+    /// Where an entry is, and its cones; `None` if it has no place.
+    #[inline]
+    pub(super) fn get(&self, id: EntryId) -> Option<(&EntrySite, &[TableCap])> {
+        let chunk = self.chunks.get(id.index() / CHUNK_TEXELS)?;
+        let entry = chunk.entries.get(usize::from(chunk.place_of[id.index() % CHUNK_TEXELS]))?;
+        Some((&entry.site, chunk.caps_of(entry)))
+    }
+
+    /// All entries that have a place, in the order of the cache.
+    #[cfg(feature = "gpu")]
+    pub(super) fn each(&self) -> impl Iterator<Item = (EntryId, &EntrySite, &[TableCap])> {
+        self.chunks
+            .iter()
+            .flat_map(|chunk| chunk.entries.iter().map(|entry| (entry.id, &entry.site, chunk.caps_of(entry))))
+    }
+}
+
+impl Chunk {
+    #[inline]
+    fn caps_of(&self, entry: &TableEntry) -> &[TableCap] {
+        let first = entry.first as usize;
+        &self.caps[first..first + entry.count as usize]
+    }
+}
