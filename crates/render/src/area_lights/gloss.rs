@@ -1,4 +1,4 @@
-//! What a surface reflects of one cone of light whose irradiance on it is known: the twin of `gloss.wgsl`.
+//! What a surface reflects of one cone of light whose irradiance on it is known: the twin of `gloss.wgsl`, and of `area_seen` in `reflect.wgsl`.
 
 use std::f32::consts::FRAC_1_PI;
 

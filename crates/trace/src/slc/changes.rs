@@ -221,8 +221,8 @@ fn mean_cosine(normal: Vec3, offset: Vec3, radius: f32) -> f32 {
     above * above / (4.0 * sine.max(f32::MIN_POSITIVE))
 }
 
-/// A ball that holds an instance: about the middle of its box, and no larger than its vertices want it, for it says for whose light rays are sent anew.
-/// `None` where it is not there.
+/// A ball that holds an instance: about the middle of its box, and just large enough for its vertices, since all entries whose light it may meet take rays
+/// anew. `None` where it is not there.
 fn ball_about(scene: &Scene, pose: &Pose, instance: usize) -> Option<(Vec3, f32)> {
     let bounds = scene.instance_bounds_world(pose, instance);
     if bounds.is_empty() {
@@ -234,7 +234,7 @@ fn ball_about(scene: &Scene, pose: &Pose, instance: usize) -> Option<(Vec3, f32)
         .iter()
         .map(|vertex| map.transform_point3(*vertex).distance_squared(center))
         .fold(0.0, f32::max);
-    Some((center, farthest2.sqrt().min(0.5 * bounds.diagonal())))
+    Some((center, farthest2.sqrt()))
 }
 
 /// A ball that holds both.

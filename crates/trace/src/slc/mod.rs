@@ -176,10 +176,6 @@ impl Update for MomentEntry {
     }
 }
 
-/// Samples from which on it is believed that an entry sees all of a light, and in one of how many frames it then takes samples while it is young.
-const PLAIN_SAMPLES: u32 = 16;
-const PLAIN_YOUNG_TURNS: u32 = 2;
-
 /// Part of a light from which on all of it is seen.
 const ALL_SEEN: f32 = 0.98;
 
@@ -197,19 +193,14 @@ fn turn_of(id: EntryId) -> u32 {
 }
 
 /// Samples of an entry about which nothing changed. Rays from one place together are quicker than apart, so a grown entry takes several in
-/// one of as many frames; `phase` says whose turn it is. One that sees all of each light, or none of it, needs no more to be shaded by the lights'
-/// shapes, and grows slower from the start.
+/// one of as many frames; `phase` says whose turn it is.
 fn quiet_samples(entry: &MomentEntry, params: &SlcParams, phase: u32) -> u32 {
     let (first, most) = (params.first_samples.max(1), u32::from(params.moment.max_samples));
     let grown = first.saturating_mul(params.first_updates).min(most);
     let has = u32::from(entry.samples());
     let turns = (first / params.samples.max(1)).max(1);
-    let is_plain = has >= PLAIN_SAMPLES && is_plain(entry);
-    // What it takes less while it is young it takes more later: all are settled after as many frames.
-    let plain_turns = [PLAIN_YOUNG_TURNS, (turns * 3 / 4).max(1)];
-    let [young_turns, turns] = if is_plain { plain_turns } else { [1, turns] };
     if has < grown {
-        if phase.is_multiple_of(young_turns) { first } else { 0 }
+        first
     } else if has < most && params.samples > 0 && phase.is_multiple_of(turns) {
         params.samples.saturating_mul(turns).min(most - has)
     } else {

@@ -1,32 +1,36 @@
 //! The cache as texels: entries in the order of blocks, and a hash table of these. `read.wgsl` reads both.
 //!
 //! An entry is [`ENTRY_TEXELS`] texels of four words. Two say where it is: position and normal; shading normal, and in one word cones, and whether it
-//! has samples and a place. Of each cone two follow: energy and mean cosine; direction, cosine of its angle, part of its light that is seen through it,
+//! has samples. Of each cone two follow: energy and mean cosine; direction, cosine of its angle, part of its light that is seen through it,
 //! and in one word which light that is and what else a [`TableCap`] tells. Normals and directions are octahedral, 16 bits a coordinate.
 
-use dapple_store::cones::{BLOCK_TEXELS, BlockKey, ConeEntry, EntrySite, MOST_MOMENT_CONES};
+use dapple_store::cones::{BLOCK_TEXELS, BlockKey, ConeEntry, EntrySite, MOST_MOMENT_CONES, MomentEntry};
 use dapple_store::octahedral::flatten;
 use glam::Vec3;
 
+use super::super::CapTable;
 use super::super::table::TableCap;
-use super::super::{CapTable, Caps};
 use super::{CardError, Texel};
 
 /// Texels of an entry.
 const ENTRY_TEXELS: usize = 2 + 2 * MOST_MOMENT_CONES;
 /// Blocks of a row: as many as WebGL2's narrowest textures hold.
 const BLOCKS_A_ROW: usize = 3;
+/// Texels of a block.
+const BLOCK_WIDTH: usize = BLOCK_TEXELS * ENTRY_TEXELS;
 /// Texels of a row.
-pub(super) const ROW_TEXELS: usize = BLOCKS_A_ROW * BLOCK_TEXELS * ENTRY_TEXELS;
+pub(super) const ROW_TEXELS: usize = BLOCKS_A_ROW * BLOCK_WIDTH;
 /// Places of a row of the hash table, two texels each.
 const HASH_A_ROW: usize = 1024;
+/// Most blocks that it holds: half of the places of as many rows as WebGL2's textures have.
+const MOST_HASHED: usize = HASH_A_ROW * 2048 / 2;
 /// Texels of such a row.
 pub(super) const HASH_ROW_TEXELS: usize = 2 * HASH_A_ROW;
 /// How far a block may lie from the place that it hashes to.
 const MOST_PROBES: usize = 64;
 const HAS_SAMPLES: u32 = 0x100;
-const HAS_SITE: u32 = 0x200;
 const IS_WHOLE: u32 = 1 << 31;
+const SETTLED: u32 = 0x7fff;
 
 const _: () = assert!(ROW_TEXELS <= 2048 && ENTRY_TEXELS == 10);
 
@@ -44,53 +48,64 @@ pub(super) struct Entries {
 }
 
 impl Entries {
-    /// Takes over the entries that have a place now. Those of other blocks stay as they were: nobody finds them.
-    pub(super) fn take<E: ConeEntry + Caps>(
+    /// Takes over the entries that have a place now, with all of their blocks: texels without one are empty. Other blocks stay as they were: nobody
+    /// finds them.
+    pub(super) fn take(
         &mut self,
-        table: &CapTable<'_, E>,
+        table: &CapTable<'_, MomentEntry>,
         most_rows: usize,
     ) -> Result<(), CardError> {
         let mut blocks: Vec<(BlockKey, u32)> = Vec::new();
-        let mut entry_texels = [Texel::default(); ENTRY_TEXELS];
+        let mut texels = vec![Texel::default(); BLOCK_WIDTH];
         for (id, site, caps) in table.each() {
             let Some((key, entry)) = table.cache.key(id).zip(table.cache.entry(id)) else { continue };
-            let block = id.index() / BLOCK_TEXELS;
-            if blocks.last().is_none_or(|(last, _)| *last != key.block) {
-                blocks.push((key.block, block as u32));
-                self.reserve(block, most_rows)?;
+            let block = (id.index() / BLOCK_TEXELS) as u32;
+            if blocks.last().is_none_or(|(_, last)| *last != block) {
+                if let Some((_, last)) = blocks.last() {
+                    self.put(*last as usize, &texels, most_rows)?;
+                }
+                texels.fill(Texel::default());
+                blocks.push((key.block, block));
             }
-            write(&mut entry_texels, site, caps, entry.confidence() > 0);
-            let row = block / BLOCKS_A_ROW;
-            let first = row * ROW_TEXELS
-                + (block % BLOCKS_A_ROW * BLOCK_TEXELS + usize::from(key.texel)) * ENTRY_TEXELS;
-            let held = &mut self.texels[first..first + ENTRY_TEXELS];
-            if held != entry_texels {
-                held.copy_from_slice(&entry_texels);
-                self.dirty[row] = true;
-            }
+            let out = &mut texels.as_chunks_mut::<ENTRY_TEXELS>().0[usize::from(key.texel)];
+            write(out, site, caps, entry.confidence() > 0);
         }
-        let hash = hash_table(&blocks);
+        if let Some((_, last)) = blocks.last() {
+            self.put(*last as usize, &texels, most_rows)?;
+        }
+        let hash = hash_table(&blocks).ok_or(CardError::Blocks { found: blocks.len(), most: MOST_HASHED })?;
         self.is_hash_dirty |= hash != self.hash;
         self.hash = hash;
         Ok(())
     }
 
-    /// Makes room for a block.
-    fn reserve(&mut self, block: usize, most_rows: usize) -> Result<(), CardError> {
-        let rows = block / BLOCKS_A_ROW + 1;
-        if rows > most_rows {
+    /// All of it is to be sent again.
+    pub(super) fn forget_sent(&mut self) {
+        self.dirty.fill(true);
+        self.is_hash_dirty = true;
+    }
+
+    /// Puts a block's texels where they belong.
+    fn put(&mut self, block: usize, texels: &[Texel], most_rows: usize) -> Result<(), CardError> {
+        let row = block / BLOCKS_A_ROW;
+        if row >= most_rows {
             return Err(CardError::Blocks { found: block + 1, most: most_rows * BLOCKS_A_ROW });
         }
-        if rows > self.dirty.len() {
-            self.texels.resize(rows * ROW_TEXELS, Texel::default());
-            self.dirty.resize(rows, true);
+        if row >= self.dirty.len() {
+            self.texels.resize((row + 1) * ROW_TEXELS, Texel::default());
+            self.dirty.resize(row + 1, true);
+        }
+        let first = row * ROW_TEXELS + block % BLOCKS_A_ROW * BLOCK_WIDTH;
+        let held = &mut self.texels[first..first + BLOCK_WIDTH];
+        if held != texels {
+            held.copy_from_slice(texels);
+            self.dirty[row] = true;
         }
         Ok(())
     }
 }
 
 fn write(out: &mut [Texel; ENTRY_TEXELS], site: &EntrySite, caps: &[TableCap], has_samples: bool) {
-    *out = [Texel::default(); ENTRY_TEXELS];
     let count = caps.len().min(MOST_MOMENT_CONES);
     for (texels, cone) in out[2..].as_chunks_mut::<2>().0.iter_mut().zip(caps) {
         *texels = cone_texels(cone);
@@ -98,14 +113,15 @@ fn write(out: &mut [Texel; ENTRY_TEXELS], site: &EntrySite, caps: &[TableCap], h
     let has_samples = if has_samples { HAS_SAMPLES } else { 0 };
     let [x, y, z] = site.position_world.to_array().map(f32::to_bits);
     out[0] = [x, y, z, octahedral(site.normal_world)];
-    out[1] = [octahedral(site.normal_shading_world), count as u32 | has_samples | HAS_SITE, 0, 0];
+    out[1] = [octahedral(site.normal_shading_world), count as u32 | has_samples, 0, 0];
 }
 
 fn cone_texels(cone: &TableCap) -> [Texel; 2] {
     let cap = &cone.cap;
     let [r, g, b] = cap.energy.to_array().map(f32::to_bits);
     let light = cone.slot().map_or(0, |slot| {
-        let settled = (cone.settled * 32767.0 + 0.5) as u32;
+        // The largest is 1 itself, so that what is settled leaves nothing.
+        let settled = ((cone.settled * 32768.0 + 0.5) as u32).min(SETTLED);
         (slot as u32 + 1) | settled << 16 | if cone.is_whole { IS_WHOLE } else { 0 }
     });
     [
@@ -122,14 +138,16 @@ fn octahedral(direction: Vec3) -> u32 {
 }
 
 /// Blocks and their numbers where `read.wgsl` looks for them: from the place that a key hashes to on, up to the first that is free.
-fn hash_table(blocks: &[(BlockKey, u32)]) -> Vec<Texel> {
+/// `None` if there are too many.
+fn hash_table(blocks: &[(BlockKey, u32)]) -> Option<Vec<Texel>> {
     let mut places = (2 * blocks.len()).next_power_of_two().max(HASH_A_ROW);
-    loop {
+    while places <= 2 * MOST_HASHED {
         if let Some(table) = hash_table_of(blocks, places) {
-            return table;
+            return Some(table);
         }
         places *= 2;
     }
+    None
 }
 
 /// With so many places, unless one lies too far from its own.

@@ -1,6 +1,6 @@
 //! The same shading on a graphics card: the twin is [`shade_cones`](super::shade_cones), and takes the same.
 //!
-//! - takes: a device, a [`CapTable`], once for all viewers of a moment; then the samples of each viewer
+//! - takes: a device, a [`CapTable`] of our cones, once for all viewers of a moment; then the samples of each viewer
 //! - returns: a texture of outgoing radiance, in rows from the top
 //!
 //! Entries are found on the card, by a hash table of blocks; only those that changed are sent to it. Fragments and textures alone, as WebGL2 has them.
@@ -10,14 +10,16 @@ mod samples;
 #[cfg(test)]
 mod tests;
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 use dapple_gpu::{Gpu, ReadError, join, read_texture, shader_module, wgpu};
 use dapple_scene::ShadingPoint;
-use dapple_store::cones::{ConeEntry, PixelPlace};
+use dapple_store::cones::{MomentEntry, PixelPlace};
 use glam::Vec3;
 
 use self::entries::{Entries, HASH_ROW_TEXELS, ROW_TEXELS};
-use super::{Blending, CapTable, Caps, Form, Samples, SlcShading};
+use super::{Blending, CapTable, Form, Samples, SlcShading};
 use crate::area_lights::MAX_AREA_LIGHTS;
 use crate::area_lights::table::TABLE_WIDTH;
 use crate::tables::{float_table, word_table, write_layer, write_rows};
@@ -27,6 +29,12 @@ type Texel = [u32; 4];
 
 /// Rows of a layer of entries: no more than WebGL2's textures have.
 const MOST_LAYER_ROWS: usize = 2048;
+
+/// Rows of entries in all: a gibibyte.
+const MOST_ROWS: usize = (1 << 30) / (ROW_TEXELS * size_of::<Texel>());
+
+/// Samples that are on the card at once: 64 MiB.
+const BAND_SAMPLES: u32 = 1 << 19;
 
 const OUT_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 
@@ -38,7 +46,7 @@ pub enum CardError {
     NoFloats,
     /// More blocks of entries than textures have room for.
     #[error(
-        "light cones: the cache has {found} blocks, this device has room for {most}: give the cache less memory"
+        "light cones: the cache has {found} blocks, there is room for {most} on the card: give the cache less memory"
     )]
     Blocks {
         /// Blocks of the cache, at least.
@@ -46,13 +54,16 @@ pub enum CardError {
         /// What there is room for.
         most: usize,
     },
-    /// The picture has no pixels, or is larger than textures are, or its samples are not as many as its pixels.
+    /// The picture has no pixels, or is larger than textures are, or its lists are not as long as it is large.
     #[error(
-        "light cones: {samples} samples are no picture of rows of {width} that this device can draw: sides are 1 to {most}"
+        "light cones: {samples} samples with {places} places in rows of {width} are no picture that this device can draw: there is a place a sample, rows \
+         are whole, and sides 1 to {most}"
     )]
     Size {
         /// Samples there are.
         samples: usize,
+        /// Places in the charts.
+        places: usize,
         /// Samples of a row.
         width: usize,
         /// Longest side.
@@ -74,6 +85,20 @@ pub struct CardView<'a> {
     pub pixels: &'a [Option<PixelPlace>],
 }
 
+impl CardView<'_> {
+    /// Columns and rows.
+    fn size(&self, gpu: &Gpu) -> Result<(u32, u32), CardError> {
+        let (samples, places, width) = (self.points.len(), self.pixels.len(), self.width);
+        let most = gpu.device.limits().max_texture_dimension_2d as usize;
+        let height = samples.checked_div(width).unwrap_or(0);
+        let fits = (1..=most).contains(&width) && (1..=most).contains(&height);
+        if !fits || width * height != samples || places != samples {
+            return Err(CardError::Size { samples, places, width, most });
+        }
+        Ok((width as u32, height as u32))
+    }
+}
+
 /// `ConeParams` of `read.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -82,6 +107,9 @@ struct ConeUniform {
     mask: u32,
     directions: i32,
     flags: u32,
+    first_row: i32,
+    pad_a: u32,
+    pad_b: [u32; 2],
 }
 
 /// Shades cones on a card. Keeps what it sent from moment to moment.
@@ -130,19 +158,25 @@ impl ConePass {
     /// Sends what changed of the entries that have a place now, and the lights. Returns the bytes sent.
     ///
     /// # Errors
-    /// More blocks than the device's textures hold. Pictures stay as they were.
-    pub fn update<E: ConeEntry + Caps>(
-        &mut self,
-        gpu: &Gpu,
-        table: &CapTable<'_, E>,
-    ) -> Result<u64, CardError> {
-        let limits = gpu.device.limits();
-        self.entries.take(table, limits.max_texture_array_layers as usize * MOST_LAYER_ROWS)?;
+    /// More blocks than there is room for, or a device that fails; then nothing is taken to be sent.
+    pub fn update(&mut self, gpu: &Gpu, table: &CapTable<'_, MomentEntry>) -> Result<u64, CardError> {
+        let layers = gpu.device.limits().max_texture_array_layers as usize;
+        self.entries.take(table, (layers * MOST_LAYER_ROWS).min(MOST_ROWS))?;
         let lights = table.lights.map(|lights| lights.texels()).unwrap_or_default();
         if !lights.is_empty() {
             write_rows(gpu, &self.lights, 0, &lights);
         }
-        Ok(self.send_entries(gpu) + self.send_hash(gpu) + size_of_val(&lights[..]) as u64)
+        let sent = self.send_entries(gpu) + self.send_hash(gpu) + size_of_val(&lights[..]) as u64;
+        match gpu.take_fault() {
+            None => Ok(sent),
+            Some(fault) => {
+                // Tables that there was no memory for are made anew.
+                self.entry_table = word_table(gpu, "cones", (ROW_TEXELS as u32, 1, 2));
+                self.hash_table = word_table(gpu, "blocks of cones", (HASH_ROW_TEXELS as u32, 1, 1));
+                self.entries.forget_sent();
+                Err(ReadError::Fault(fault).into())
+            }
+        }
     }
 
     fn send_entries(&mut self, gpu: &Gpu) -> u64 {
@@ -187,40 +221,51 @@ impl ConePass {
         size_of_val(&texels[..]) as u64
     }
 
-    /// Records the shading of a view; what it finds is in [`ConePass::picture`], until the next. A submission holds one view: its samples are written
-    /// before all that it holds.
+    /// Shades a view, band after band of rows; what it finds is in [`ConePass::picture`], until the next.
     ///
     /// # Errors
-    /// A picture that the device cannot draw. Nothing is recorded then.
-    pub fn draw(
-        &mut self,
-        gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
-        view: &CardView<'_>,
-        shading: &SlcShading,
-    ) -> Result<(), CardError> {
-        let size = self.write_samples(gpu, view, shading.look_up.bias)?;
-        let places = self.entries.hash.len() / 2;
-        gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform(shading, places)));
+    /// A picture that the device cannot draw. Nothing is drawn then.
+    pub fn draw(&mut self, gpu: &Gpu, view: &CardView<'_>, shading: &SlcShading) -> Result<(), CardError> {
+        let (width, height) = view.size(gpu)?;
+        if (self.picture.width(), self.picture.height()) != (width, height) {
+            self.picture = picture(gpu, (width, height));
+        }
+        let rows = (BAND_SAMPLES / width).clamp(1, height);
+        if (self.samples.width(), self.samples.height()) != (width, rows) {
+            self.samples = word_table(gpu, "samples of cones", (width, rows, samples::LAYERS as u32));
+        }
         let group = self.group(gpu);
         let target = self.picture.create_view(&wgpu::TextureViewDescriptor::default());
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("cones"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &target,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            ..Default::default()
-        });
-        pass.set_viewport(0.0, 0.0, size.0 as f32, size.1 as f32, 0.0, 1.0);
-        pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &group, &[]);
-        pass.draw(0..3, 0..1);
+        let places = self.entries.hash.len() / 2;
+        for first in (0..height).step_by(rows as usize) {
+            let end = (first + rows).min(height);
+            self.write_samples(gpu, view, shading.look_up.bias, first..end);
+            let uniform = ConeUniform { first_row: first as i32, ..uniform(shading, places) };
+            gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
+            let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+            let background = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("cones"),
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: &target,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: if first == 0 { background } else { wgpu::LoadOp::Load },
+                        store: wgpu::StoreOp::Store,
+                    },
+                })],
+                ..Default::default()
+            });
+            pass.set_viewport(0.0, 0.0, width as f32, height as f32, 0.0, 1.0);
+            pass.set_scissor_rect(0, first, width, end - first);
+            pass.set_pipeline(&self.pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            pass.draw(0..3, 0..1);
+            drop(pass);
+            // What is written to the queue is there before what is submitted next: a submission holds one band.
+            gpu.queue.submit([encoder.finish()]);
+        }
         Ok(())
     }
 
@@ -239,33 +284,18 @@ impl ConePass {
         view: &CardView<'_>,
         shading: &SlcShading,
     ) -> Result<Vec<Vec3>, CardError> {
-        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        self.draw(gpu, &mut encoder, view, shading)?;
-        gpu.queue.submit([encoder.finish()]);
+        self.draw(gpu, view, shading)?;
         let bytes = read_texture(gpu, &self.picture, 0).await?;
         let texels: &[[f32; 4]] = bytemuck::cast_slice(&bytes);
         Ok(texels.iter().map(|[r, g, b, _]| Vec3::new(*r, *g, *b)).collect())
     }
 
-    /// Returns columns and rows.
-    fn write_samples(&mut self, gpu: &Gpu, view: &CardView<'_>, bias: f32) -> Result<(u32, u32), CardError> {
-        let (samples, width) = (view.points.len(), view.width);
-        let most = gpu.device.limits().max_texture_dimension_2d as usize;
-        let height = samples.checked_div(width).unwrap_or(0);
-        let fits = (1..=most).contains(&width) && (1..=most).contains(&height);
-        if !fits || width * height != samples || view.pixels.len() != samples {
-            return Err(CardError::Size { samples, width, most });
-        }
-        let size = (width as u32, height as u32);
-        if (self.samples.width(), self.samples.height()) != size {
-            self.samples = word_table(gpu, "samples of cones", (size.0, size.1, samples::LAYERS as u32));
-            self.picture = picture(gpu, size);
-        }
-        let texels = samples::texels(view.points, view.pixels, bias);
-        for (layer, texels) in (0..).zip(texels.chunks_exact(samples)) {
+    fn write_samples(&self, gpu: &Gpu, view: &CardView<'_>, bias: f32, rows: Range<u32>) {
+        let range = rows.start as usize * view.width..rows.end as usize * view.width;
+        let texels = samples::texels(&view.points[range.clone()], &view.pixels[range.clone()], bias);
+        for (layer, texels) in (0..).zip(texels.chunks_exact(range.len())) {
             write_layer(gpu, &self.samples, layer, 0, texels);
         }
-        Ok(size)
     }
 
     fn group(&self, gpu: &Gpu) -> wgpu::BindGroup {
@@ -307,8 +337,16 @@ fn uniform(shading: &SlcShading, places: usize) -> ConeUniform {
     let flags = u32::from(shading.look_up.blend)
         | u32::from(shading.form == Form::Ratio) << 1
         | u32::from(shading.blending == Blending::Cones) << 2;
-    // Without a block an empty table, of one place or more.
-    ConeUniform { bias: shading.look_up.bias, mask: places.max(1) as u32 - 1, directions, flags }
+    ConeUniform {
+        bias: shading.look_up.bias,
+        // Without a block an empty table, of one place or more.
+        mask: places.max(1) as u32 - 1,
+        directions,
+        flags,
+        first_row: 0,
+        pad_a: 0,
+        pad_b: [0; 2],
+    }
 }
 
 /// The files of the pass.

@@ -1,5 +1,5 @@
-// The cache on the card: which entries a sample reads, and what lies in them. The twins are `cones::Reader` and `slc::places`; what lies where is
-// `entries.rs`'.
+// The cache on the card: which entries a sample reads, and what lies in them. The twins are `Reader` and `Nearby` of `cones::cache`; `entries.rs` says what
+// lies where.
 
 struct ConeParams {
     // Texels are this many pixels wide.
@@ -10,6 +10,10 @@ struct ConeParams {
     directions: i32,
     // CONE_BLENDS and others.
     flags: u32,
+    // Of the picture, in `samples`.
+    first_row: i32,
+    pad_a: u32,
+    pad_b: vec2<u32>,
 }
 
 // In `flags`: a sample reads the 2 × 2 texels about it; energies are irradiance; what several entries hold is shaded cone by cone.
@@ -29,12 +33,9 @@ const ENTRY_TEXELS: i32 = 10;
 const HASH_A_ROW: u32 = 1024u;
 const MOST_PROBES: i32 = 64;
 const HAS_SAMPLES: u32 = 0x100u;
-const HAS_SITE: u32 = 0x200u;
 
-// As `cones::key`: a family of slabs; finest and coarsest level.
+// As `cones::key`: a family of slabs.
 const SLABS: u32 = 0x80000000u;
-const FINEST_LEVEL: i32 = -6;
-const COARSEST_LEVEL: i32 = 12;
 const NO_COORDINATE: i32 = 0x7fffffff;
 
 // Where a sample lies in the charts.
@@ -45,8 +46,7 @@ struct Place {
     depth: f32,
     // Texels of the chart's rectangle.
     size: vec2<f32>,
-    // Pixels of the sample a texel of the chart.
-    ratio: f32,
+    level: i32,
 }
 
 struct BlockKey {
@@ -66,13 +66,6 @@ struct Reads {
 
 fn edge_of(level: i32) -> f32 {
     return bitcast<f32>(u32(127 + level) << 23u);
-}
-
-fn level_of(ratio: f32) -> i32 {
-    let bits = bitcast<u32>(ratio);
-    // From the square root of two on it is nearer to the next.
-    let up = select(0, 1, (bits & 0x7fffffu) > 0x3504f3u);
-    return clamp(i32(bits >> 23u) - 127 + up, FINEST_LEVEL, COARSEST_LEVEL);
 }
 
 fn hashed(key: BlockKey) -> u32 {
@@ -131,8 +124,7 @@ fn entry_at(chart: BlockKey, texel: vec2<i32>) -> i32 {
 
 fn read_entries(place: Place) -> Reads {
     var reads: Reads;
-    let level = level_of(place.ratio);
-    let shrink = edge_of(-level);
+    let shrink = edge_of(-place.level);
     let at = place.uv * shrink;
     let is_slab = (place.chart & SLABS) != 0u;
     var low = vec2<i32>(floor(vec2(0.5 * shrink)));
@@ -143,7 +135,7 @@ fn read_entries(place: Place) -> Reads {
         high = vec2(NO_COORDINATE);
         slab = i32(floor(place.depth * shrink));
     }
-    let chart = BlockKey(place.instance, place.chart, level, slab, vec2(0));
+    let chart = BlockKey(place.instance, place.chart, place.level, slab, vec2(0));
     if (params.flags & CONE_BLENDS) != 0u {
         let corner = floor(at - 0.5);
         let part = clamp(at - 0.5 - corner, vec2(0.0), vec2(1.0));
@@ -186,7 +178,6 @@ struct Site {
     normal: vec3<f32>,
     normal_shading: vec3<f32>,
     cones: i32,
-    is_known: bool,
 }
 
 fn site_of(entry: i32) -> Site {
@@ -197,7 +188,6 @@ fn site_of(entry: i32) -> Site {
         unflattened(place.w),
         unflattened(rest.x),
         i32(rest.y & 0xffu),
-        (rest.y & HAS_SITE) != 0u,
     );
 }
 
@@ -217,6 +207,7 @@ struct Cone {
 fn cone_of(entry: i32, index: i32) -> Cone {
     let light = entry_texel(entry, 2 + 2 * index);
     let shape = entry_texel(entry, 3 + 2 * index);
+    let settled = (shape.w >> 16u) & 0x7fffu;
     return Cone(
         bitcast<vec3<f32>>(light.xyz),
         bitcast<f32>(light.w),
@@ -225,7 +216,7 @@ fn cone_of(entry: i32, index: i32) -> Cone {
         i32(shape.w & 0xffffu) - 1,
         bitcast<f32>(shape.z),
         (shape.w & 0x80000000u) != 0u,
-        f32((shape.w >> 16u) & 0x7fffu) / 32767.0,
+        select(f32(settled) / 32768.0, 1.0, settled == 0x7fffu),
     );
 }
 

@@ -144,9 +144,6 @@ fn reflected_of_cones(p: ConePoint, place: Place) -> vec3<f32> {
     var plain_total = 0.0;
     for (var i = 0; i < found.count; i++) {
         let site = site_of(found.entry[i]);
-        if !site.is_known {
-            continue;
-        }
         let facing = fourth(max(dot(p.surface.flat_normal, site.normal), 0.0));
         let leaning = fourth(max(dot(p.surface.normal, site.normal_shading), 0.0));
         let off = dot(p.surface.flat_normal, site.position - p.surface.position) / texel;
@@ -273,7 +270,8 @@ fn cone_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32
 // Layers of `samples`, as `samples.rs` writes them.
 @fragment
 fn cone_fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
-    let at = vec2<i32>(position.xy);
+    // A band of the picture has its samples to itself.
+    let at = vec2<i32>(position.xy) - vec2(0, params.first_row);
     let normal = textureLoad(samples, at, 1, 0);
     // Whether there is a surface, whether it has a place in the charts, and whether it has gloss.
     let kind = normal.w;
@@ -300,8 +298,7 @@ fn cone_fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f3
         let footprint = bitcast<f32>(shading.w);
         let size = vec2<f32>(vec2(chart.z & 0xffffu, chart.z >> 16u));
         let uv = bitcast<vec2<f32>>(texels.xy);
-        let ratio = params.bias * footprint / bitcast<f32>(chart.w);
-        let place = Place(chart.x, chart.y, uv, bitcast<f32>(texels.z), size, ratio);
+        let place = Place(chart.x, chart.y, uv, bitcast<f32>(texels.z), size, i32(texels.w));
         radiance += reflected_of_cones(ConePoint(surface, reflectance, (kind & 4u) != 0u, footprint), place);
     }
     return vec4(radiance, 1.0);

@@ -44,7 +44,8 @@ pub struct UpdateQueue {
 
 impl<E: ConeEntry> ConeCache<E> {
     /// Begins a frame: finds or makes the entries that are wanted, and lists them. Where memory is at its limit, the blocks
-    /// that were not wanted for longest make room; those wanted now never do, so what does not fit is refused.
+    /// that were not wanted for longest make room; those wanted now never do, so what does not fit is refused. In parallel in the caller's
+    /// rayon pool.
     pub fn admit(&mut self, requests: &Requests) -> UpdateQueue {
         // Frame 0 is before all, so that an entry never updated has no age.
         self.frame = self.frame.wrapping_add(1).max(1);
@@ -110,10 +111,11 @@ impl<E: ConeEntry> ConeCache<E> {
         for (((asked, block), begins), count) in asked.iter().zip(blocks).zip(begins).zip(counts) {
             let (out, rest) = std::mem::take(&mut left).split_at_mut(count);
             left = rest;
-            let Some(block) = block else { continue };
-            block.head.first_queued = first;
+            if let Some(block) = block {
+                block.head.first_queued = first;
+                jobs.push((block, asked, begins, out));
+            }
             first += count as u32;
-            jobs.push((block, asked, begins, out));
         }
         let frame = self.frame;
         jobs.into_par_iter().with_min_len(16).for_each(|(mut block, asked, begins, out)| {

@@ -284,14 +284,14 @@ impl<E: ConeEntry> ConeCache<E> {
         self.ids_of_blocks(0..self.heads.len())
     }
 
-    /// Those of them whose number divided by [`BLOCK_TEXELS`] is in the range.
+    /// Those of them whose block's number, the entry's divided by [`BLOCK_TEXELS`], is in the range.
     pub fn ids_of_blocks(&self, blocks: Range<usize>) -> impl Iterator<Item = EntryId> + '_ {
         let slots = blocks.start.min(self.heads.len())..blocks.end.min(self.heads.len());
         let used = slots.filter(|slot| self.heads[*slot].is_used);
         used.flat_map(|slot| bits(self.heads[slot].known).map(move |texel| EntryId::new(slot, texel)))
     }
 
-    /// Above the number of every entry divided by [`BLOCK_TEXELS`].
+    /// One past the last block's number.
     pub fn end_block(&self) -> usize {
         self.heads.len()
     }

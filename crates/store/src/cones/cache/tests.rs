@@ -142,6 +142,27 @@ impl MinByDistance for (f32, u32) {
 }
 
 #[test]
+fn threads_do_not_matter_where_memory_is_full() {
+    let views: Vec<_> = (0..3).map(|seed| scattered(seed, 9000)).collect();
+    let run = |threads: usize| {
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let mut cache = cache(40);
+            let queues = views.iter().map(|pixels| {
+                let views = [View { width: 90, pixels }];
+                let queue = cache.admit(&Requests::gather(&views, &LookUp::default()));
+                update_all(&mut cache, &queue);
+                queue
+            });
+            queues.collect::<Vec<_>>()
+        })
+    };
+    let one = run(1);
+    assert!(one.iter().any(|queue| queue.refused > 0) && one.iter().any(|queue| queue.evicted > 0));
+    assert_eq!(one, run(2));
+}
+
+#[test]
 fn threads_do_not_matter_and_neither_does_the_order_of_viewers() {
     let views: Vec<_> = (0..3).map(|seed| scattered(seed, 9000)).collect();
     let run = |threads: usize, order: [usize; 3]| {
