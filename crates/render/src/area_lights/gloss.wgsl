@@ -28,45 +28,70 @@ struct AreaSurface {
 fn area_gloss(r: Reflectance, s: AreaSurface, axis: vec3<f32>, cos_angle: f32, has_gloss: bool) -> vec3<f32> {
     let depth = 1.0 - cos_angle;
     let count = needed_directions(depth, r.alpha);
-    let n = f32(count);
     // Gloss so wide that directions run into each other.
-    let a2_own = r.alpha * r.alpha;
-    let a2 = min(a2_own + max(0.5 * depth / n, 0.0), max(a2_own, 1.0));
+    let a2 = r.alpha * r.alpha;
+    let lobe = lobe_of(s, min(a2 + max(0.5 * depth / f32(count), 0.0), max(a2, 1.0)));
     let basis = orthonormal_basis(axis);
-    let n_dot_v_signed = dot(s.normal, s.to_viewer);
-    let nv = clamp(n_dot_v_signed, 1e-3, 1.0);
-    let lambda_v = sqrt(nv * nv * (1.0 - a2) + a2);
-    // Sums of n·l (1 − f), D V n·l (1 − f), D V n·l f, with f Schlick's fifth power; of n·l above the triangle, and of n·l.
     var sums = vec4(0.0);
     var over = 0.0;
     var turn = vec2(1.0, 0.0);
     for (var i = 0; i < count; i++) {
-        let height = select((f32(i) + 0.5) / n, 0.0, count == 1);
-        let below = depth * height;
-        let radius = sqrt(max(below * (2.0 - below), 0.0));
-        let l = basis.tangent * (radius * turn.x) + basis.bitangent * (radius * turn.y) + axis * (1.0 - below);
-        turn = vec2(turn.x * GOLDEN_TURN.x - turn.y * GOLDEN_TURN.y, turn.x * GOLDEN_TURN.y + turn.y * GOLDEN_TURN.x);
-        let shading = dot(s.normal, l);
-        let nl = select(0.0, max(shading, 0.0), dot(s.flat_normal, l) > 0.0);
-        let vl = dot(s.to_viewer, l);
-        let reciprocal = 1.0 / sqrt(max(2.0 + 2.0 * vl, 1e-6));
-        let vh = clamp((1.0 + vl) * reciprocal, 0.0, 1.0);
-        let nh = clamp((n_dot_v_signed + shading) * reciprocal, 0.0, 1.0);
-        let miss = fifth_power(1.0 - vh);
-        let f = (1.0 - nh) * (1.0 + nh) + nh * nh * a2;
-        let d = a2 * FRAC_1_PI / (f * f);
-        let safe = max(nl, 1e-3);
-        let v = 0.5 / (safe * lambda_v + nv * sqrt(safe * safe * (1.0 - a2) + a2));
-        let dv = d * v * nl;
-        sums += vec4(nl * (1.0 - miss), dv * (1.0 - miss), dv * miss, nl);
-        over += max(shading, 0.0);
+        let l = in_cone(axis, basis, depth, i, count, turn);
+        turn = turned(turn);
+        sums += reflected_parts(s, lobe, l);
+        over += max(dot(s.normal, l), 0.0);
     }
-    over = max(over, AREA_LEAST_COSINE * n);
+    over = max(over, AREA_LEAST_COSINE * f32(count));
     if !has_gloss {
         return r.diffuse * (FRAC_1_PI * sums.w / over);
     }
     let reflected = r.diffuse * (1.0 - r.f0) * (FRAC_1_PI * sums.x) + r.f0 * sums.y + vec3(sums.z);
     return reflected / over;
+}
+
+// What of gloss is the same for all directions of light.
+struct Lobe {
+    // Squared alpha.
+    a2: f32,
+    n_dot_v_signed: f32,
+    n_dot_v: f32,
+    lambda_v: f32,
+}
+
+fn lobe_of(s: AreaSurface, a2: f32) -> Lobe {
+    let n_dot_v_signed = dot(s.normal, s.to_viewer);
+    let n_dot_v = clamp(n_dot_v_signed, 1e-3, 1.0);
+    return Lobe(a2, n_dot_v_signed, n_dot_v, sqrt(n_dot_v * n_dot_v * (1.0 - a2) + a2));
+}
+
+// What reflectance is made of, for light from one direction: n·l (1 − f), D V n·l (1 − f), D V n·l f, with f Schlick's fifth power, and n·l, all above
+// the triangle.
+fn reflected_parts(s: AreaSurface, lobe: Lobe, l: vec3<f32>) -> vec4<f32> {
+    let shading = dot(s.normal, l);
+    let nl = select(0.0, max(shading, 0.0), dot(s.flat_normal, l) > 0.0);
+    // h = (v + l) / |v + l|, |v + l|² = 2 + 2 v·l.
+    let vl = dot(s.to_viewer, l);
+    let reciprocal = 1.0 / sqrt(max(2.0 + 2.0 * vl, 1e-6));
+    let vh = clamp((1.0 + vl) * reciprocal, 0.0, 1.0);
+    let nh = clamp((lobe.n_dot_v_signed + shading) * reciprocal, 0.0, 1.0);
+    let miss = fifth_power(1.0 - vh);
+    let f = (1.0 - nh) * (1.0 + nh) + nh * nh * lobe.a2;
+    let safe = max(nl, 1e-3);
+    let smith = safe * lobe.lambda_v + lobe.n_dot_v * sqrt(safe * safe * (1.0 - lobe.a2) + lobe.a2);
+    let dv = (0.5 * FRAC_1_PI * lobe.a2) * nl / (f * f * smith);
+    return vec4(nl * (1.0 - miss), dv * (1.0 - miss), dv * miss, nl);
+}
+
+// The i-th of so many directions evenly in a cone, a golden spiral: `turn` is where it has come to. The twin is `cap_pattern`.
+fn in_cone(axis: vec3<f32>, basis: Basis, depth: f32, i: i32, count: i32, turn: vec2<f32>) -> vec3<f32> {
+    let height = select((f32(i) + 0.5) / f32(count), 0.0, count == 1);
+    let below = depth * height;
+    let radius = sqrt(max(below * (2.0 - below), 0.0));
+    return basis.tangent * (radius * turn.x) + basis.bitangent * (radius * turn.y) + axis * (1.0 - below);
+}
+
+fn turned(turn: vec2<f32>) -> vec2<f32> {
+    return vec2(turn.x * GOLDEN_TURN.x - turn.y * GOLDEN_TURN.y, turn.x * GOLDEN_TURN.y + turn.y * GOLDEN_TURN.x);
 }
 
 // Directions that stand for a cone of that 1 − cos a on a surface of that alpha.

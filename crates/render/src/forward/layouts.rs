@@ -3,7 +3,7 @@
 use dapple_gpu::wgpu;
 
 /// Entries of one group, numbered in order.
-fn layout(
+pub(crate) fn layout(
     device: &wgpu::Device,
     label: &str,
     entries: &[(wgpu::ShaderStages, wgpu::BindingType)],
@@ -22,7 +22,7 @@ fn layout(
         .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
 }
 
-const fn uniform(has_dynamic_offset: bool) -> wgpu::BindingType {
+pub(crate) const fn uniform(has_dynamic_offset: bool) -> wgpu::BindingType {
     wgpu::BindingType::Buffer {
         ty: wgpu::BufferBindingType::Uniform,
         has_dynamic_offset,
@@ -30,7 +30,7 @@ const fn uniform(has_dynamic_offset: bool) -> wgpu::BindingType {
     }
 }
 
-const fn texture(
+pub(crate) const fn texture(
     sample_type: wgpu::TextureSampleType,
     view_dimension: wgpu::TextureViewDimension,
 ) -> wgpu::BindingType {
@@ -38,7 +38,7 @@ const fn texture(
 }
 
 const FILTERED: wgpu::TextureSampleType = wgpu::TextureSampleType::Float { filterable: true };
-const LOADED: wgpu::TextureSampleType = wgpu::TextureSampleType::Float { filterable: false };
+pub(crate) const LOADED: wgpu::TextureSampleType = wgpu::TextureSampleType::Float { filterable: false };
 const SAMPLER: wgpu::BindingType = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
 
 use wgpu::ShaderStages as Stages;

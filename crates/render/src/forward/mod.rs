@@ -10,7 +10,7 @@ mod error;
 mod geometry;
 mod hidden;
 mod inputs;
-mod layouts;
+pub(crate) mod layouts;
 mod lookup;
 mod pipelines;
 mod points;

@@ -22,6 +22,7 @@ use self::entries::{Entries, HASH_ROW_TEXELS, ROW_TEXELS};
 use super::{Blending, CapTable, Form, Samples, SlcShading};
 use crate::area_lights::MAX_AREA_LIGHTS;
 use crate::area_lights::table::TABLE_WIDTH;
+use crate::forward::layouts::{LOADED, layout, texture, uniform};
 use crate::tables::{float_table, word_table, write_layer, write_rows};
 
 /// Four words of a table.
@@ -136,7 +137,7 @@ impl ConePass {
         if !features.allowed_usages.contains(wgpu::TextureUsages::RENDER_ATTACHMENT) {
             return Err(CardError::NoFloats);
         }
-        let layout = layout(&gpu.device);
+        let layout = cone_layout(&gpu.device);
         Ok(ConePass {
             pipeline: pipeline(&gpu.device, &layout),
             layout,
@@ -240,7 +241,7 @@ impl ConePass {
         for first in (0..height).step_by(rows as usize) {
             let end = (first + rows).min(height);
             self.write_samples(gpu, view, shading.look_up.bias, first..end);
-            let uniform = ConeUniform { first_row: first as i32, ..uniform(shading, places) };
+            let uniform = ConeUniform { first_row: first as i32, ..cone_uniform(shading, places) };
             gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             let background = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
@@ -323,7 +324,7 @@ impl ConePass {
     }
 }
 
-fn uniform(shading: &SlcShading, places: usize) -> ConeUniform {
+fn cone_uniform(shading: &SlcShading, places: usize) -> ConeUniform {
     let directions = match shading.samples {
         Samples::Adaptive => 0,
         Samples::Fixed(n) => match n {
@@ -360,38 +361,18 @@ fn module() -> String {
     ])
 }
 
-fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
-    let texture = |sample_type, view_dimension| wgpu::BindingType::Texture {
-        sample_type,
-        view_dimension,
-        multisampled: false,
-    };
+/// Group 0: `read.wgsl`.
+fn cone_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let words = wgpu::TextureSampleType::Uint;
-    let floats = wgpu::TextureSampleType::Float { filterable: false };
     let (plain, layers) = (wgpu::TextureViewDimension::D2, wgpu::TextureViewDimension::D2Array);
-    let uniform = wgpu::BindingType::Buffer {
-        ty: wgpu::BufferBindingType::Uniform,
-        has_dynamic_offset: false,
-        min_binding_size: None,
-    };
     let types = [
-        uniform,
+        uniform(false),
         texture(words, layers),
         texture(words, plain),
         texture(words, layers),
-        texture(floats, plain),
+        texture(LOADED, plain),
     ];
-    let entries: Vec<_> = (0..)
-        .zip(types)
-        .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::FRAGMENT,
-            ty,
-            count: None,
-        })
-        .collect();
-    let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some("cones"), entries: &entries };
-    device.create_bind_group_layout(&descriptor)
+    layout(device, "cones", &types.map(|ty| (wgpu::ShaderStages::FRAGMENT, ty)))
 }
 
 fn pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu::RenderPipeline {

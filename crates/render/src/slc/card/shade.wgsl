@@ -64,41 +64,19 @@ fn lit_by(p: ConePoint, before: Lit, cone: Cone, site: Site, part: f32) -> Lit {
     }
     let n = f32(count);
     let basis = orthonormal_basis(cone.direction);
-    let s = p.surface;
-    let a2 = p.reflectance.alpha * p.reflectance.alpha;
-    let n_dot_v_signed = dot(s.normal, s.to_viewer);
-    let nv = clamp(n_dot_v_signed, 1e-3, 1.0);
-    let lambda_v = sqrt(nv * nv * (1.0 - a2) + a2);
-    var sums = vec3(0.0);
+    let lobe = lobe_of(p.surface, p.reflectance.alpha * p.reflectance.alpha);
+    var sums = vec4(0.0);
     // Of the entry: cosines, and directions above its horizon.
     var over = 0.0;
     var open = 0.0;
     var turn = vec2(1.0, 0.0);
     for (var i = 0; i < count; i++) {
-        let height = select((f32(i) + 0.5) / n, 0.0, count == 1);
-        let below = depth * height;
-        let radius = sqrt(max(below * (2.0 - below), 0.0));
-        let l = cone.direction * (1.0 - below) + basis.tangent * (radius * turn.x) + basis.bitangent * (radius * turn.y);
-        turn = vec2(turn.x * GOLDEN_TURN.x - turn.y * GOLDEN_TURN.y, turn.x * GOLDEN_TURN.y + turn.y * GOLDEN_TURN.x);
+        let l = in_cone(cone.direction, basis, depth, i, count, turn);
+        turn = turned(turn);
         let cosine = select(0.0, max(dot(site.normal_shading, l), 0.0), dot(site.normal, l) > 0.0);
         over += cosine;
         open += select(0.0, 1.0, cosine > 0.0);
-        let shading = dot(s.normal, l);
-        let nl = select(0.0, max(shading, 0.0), dot(s.flat_normal, l) > 0.0);
-        if !p.has_gloss {
-            sums.x += nl;
-            continue;
-        }
-        let vl = dot(s.to_viewer, l);
-        let reciprocal = 1.0 / sqrt(max(2.0 + 2.0 * vl, 1e-6));
-        let vh = clamp((1.0 + vl) * reciprocal, 0.0, 1.0);
-        let nh = clamp((n_dot_v_signed + shading) * reciprocal, 0.0, 1.0);
-        let miss = fifth_power(1.0 - vh);
-        let f = (1.0 - nh) * (1.0 + nh) + nh * nh * a2;
-        let safe = max(nl, 1e-3);
-        let smith = safe * lambda_v + nv * sqrt(safe * safe * (1.0 - a2) + a2);
-        let dv = (0.5 * FRAC_1_PI * a2) * nl / (f * f * smith);
-        sums += vec3(nl * (1.0 - miss), dv * (1.0 - miss), dv * miss);
+        sums += reflected_parts(p.surface, lobe, l);
     }
     if (params.flags & CONE_IS_RATIO) == 0u {
         over = n;
@@ -111,7 +89,7 @@ fn lit_by(p: ConePoint, before: Lit, cone: Cone, site: Site, part: f32) -> Lit {
     let energy = cone.energy * (part / over);
     let of_gloss = over / (open * cone.mean_cosine);
     return Lit(
-        before.matte + energy * sums.x,
+        before.matte + energy * select(sums.w, sums.x, p.has_gloss),
         before.gloss + energy * (of_gloss * sums.y),
         before.grazing + energy * (of_gloss * sums.z),
     );
