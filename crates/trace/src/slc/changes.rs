@@ -200,6 +200,7 @@ impl Change {
                 to,
                 energy_ratio: after / before,
                 fluence_ratio: fluence_after / fluence_before,
+                most_cosine: most_cosine(place.normal_shading_world, b, now.1),
                 size_ratio,
             });
         }
@@ -219,6 +220,15 @@ fn mean_cosine(normal: Vec3, offset: Vec3, radius: f32) -> f32 {
     }
     let above = (cosine + sine).max(0.0);
     above * above / (4.0 * sine.max(f32::MIN_POSITIVE))
+}
+
+/// Largest cosine to a normal of light from a ball at an offset, or a little more.
+fn most_cosine(normal: Vec3, offset: Vec3, radius: f32) -> f32 {
+    let distance = offset.length();
+    if distance <= radius {
+        return 1.0;
+    }
+    ((normal.dot(offset) + radius) / distance).clamp(0.0, 1.0)
 }
 
 /// A ball that holds an instance: about the middle of its box, and just large enough for its vertices, since all entries whose light it may meet take rays

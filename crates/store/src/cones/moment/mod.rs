@@ -197,6 +197,8 @@ pub struct ReAim {
     pub energy_ratio: f32,
     /// The same of fluence.
     pub fluence_ratio: f32,
+    /// Largest cosine of its light to the entry's surface now, 0 … 1: more of its fluence is never irradiance. 1 where energies are fluence.
+    pub most_cosine: f32,
     /// Its apparent radius now ÷ before, ≥ 0.
     pub size_ratio: f32,
 }
@@ -362,11 +364,14 @@ impl MomentEntry {
 
     /// Follows a light that moved: cones of this light alone turn with it and take its new energy and size. What is hidden
     /// of it is taken to stay the same share. Returns how many cones did; cones of several lights stay. Arguments that are
-    /// not finite, or negative ratios, change nothing.
+    /// not finite, or negative, change nothing.
+    ///
+    /// The ratio of energies of a light that comes up from the horizon has no bound, and what the cone has of it may have been light of another part of
+    /// it than the ratio is of: E is at most Φ × [`ReAim::most_cosine`].
     pub fn re_aim(&mut self, aim: &ReAim) -> usize {
         let (Some(from), Some(to)) = (unit(aim.from), unit(aim.to)) else { return 0 };
         let valid = |ratio: f32| ratio.is_finite() && ratio >= 0.0;
-        if ![aim.energy_ratio, aim.fluence_ratio, aim.size_ratio].into_iter().all(valid) {
+        if ![aim.energy_ratio, aim.fluence_ratio, aim.size_ratio, aim.most_cosine].into_iter().all(valid) {
             return 0;
         }
         let mut turned = 0;
@@ -376,10 +381,12 @@ impl MomentEntry {
             }
             let direction = turn(cone.direction(), from, to);
             let angle = (cone.angle() * aim.size_ratio).min(std::f32::consts::PI);
-            let energy = (cone.energy * aim.energy_ratio).min(Vec3::splat(MOST_ENERGY));
-            let fluence = cone.fluence * aim.fluence_ratio;
+            let fluence = (cone.fluence * aim.fluence_ratio).min(MOST_ENERGY);
+            let most = fluence * aim.most_cosine.min(1.0);
+            let factor = aim.energy_ratio.min(most / luminance(cone.energy).max(LEAST_ENERGY));
+            let energy = (cone.energy * factor).min(Vec3::splat(MOST_ENERGY));
             let cosine = if fluence > 0.0 { luminance(energy) / fluence } else { 1.0 };
-            let hidden = (cone.hidden * aim.energy_ratio).min(MOST_ENERGY);
+            let hidden = (cone.hidden * factor).min(MOST_ENERGY);
             *cone = MomentCone {
                 hidden,
                 seen: cone.seen,

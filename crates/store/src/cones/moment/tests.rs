@@ -113,7 +113,8 @@ proptest! {
             let plain = sample(Vec3::new(f[0], f[1], f[2]).normalize_or(Vec3::X), Vec3::splat(f[6].abs()), light);
             entry.update(&[hostile, plain], drawn, &params);
             let [from, to] = [Vec3::new(f[0], f[1], f[2]), Vec3::new(f[3], f[4], f[5])];
-            entry.re_aim(&ReAim { light, from, to, energy_ratio: f[6], fluence_ratio: f[6], size_ratio: f[7] });
+            let (energy_ratio, fluence_ratio, size_ratio, most_cosine) = (f[6], f[5], f[7], f[4]);
+            entry.re_aim(&ReAim { light, from, to, energy_ratio, fluence_ratio, most_cosine, size_ratio });
             for cone in entry.cones() {
                 prop_assert!(cone.energy.is_finite() && cone.energy.min_element() >= 0.0, "{cone:?}");
                 prop_assert!(cone.moment.is_finite() && cone.angle().is_finite(), "{cone:?}");
@@ -270,6 +271,7 @@ fn a_cone_of_one_light_follows_it() {
         to: tilted(40.0),
         energy_ratio: 0.5,
         fluence_ratio: 0.5,
+        most_cosine: 1.0,
         size_ratio: 2.0,
     };
     assert_eq!(entry.re_aim(&aim), 1);
@@ -358,6 +360,7 @@ fn what_is_seen_is_the_mean_of_seen_and_hidden_samples() {
         to: tilted(30.0),
         energy_ratio: 0.5,
         fluence_ratio: 0.5,
+        most_cosine: 1.0,
         size_ratio: 1.0,
     };
     let before = of(0);
@@ -366,6 +369,38 @@ fn what_is_seen_is_the_mean_of_seen_and_hidden_samples() {
     let cone = moved.cones().iter().find(|c| c.lights.single() == Some(0)).unwrap();
     assert!((luminance(cone.energy) / (luminance(cone.energy) + cone.hidden) - before).abs() < 1e-3);
     assert_eq!(cone.seen, before, "a light that moves is hidden as much as before until samples tell");
+}
+
+/// Light that grazed a surface which turned towards it: by cosines alone its energy would grow without bound, turn after turn.
+#[test]
+fn a_cone_that_follows_its_light_has_no_more_than_its_fluence_allows() {
+    let mut entry = MomentEntry::default();
+    let grazing = ConeSample { cosine: 0.1, ..sample(tilted(84.0), Vec3::new(0.1, 0.2, 0.1), 2) };
+    entry.update_seen(
+        &[grazing],
+        &[HiddenSample { light: 2, value: 0.4 }],
+        2,
+        |_| 1.0,
+        &MomentParams::default(),
+    );
+    let before = entry.cones()[0];
+    let aim = ReAim {
+        light: 2,
+        from: tilted(84.0),
+        to: tilted(60.0),
+        energy_ratio: 1e6,
+        fluence_ratio: 1.0,
+        most_cosine: 0.5,
+        size_ratio: 1.0,
+    };
+    for _ in 0..2 {
+        assert_eq!(entry.re_aim(&aim), 1);
+        let after = entry.cones()[0];
+        assert!((after.fluence / before.fluence - 1.0).abs() < 1e-5, "{after:?}");
+        assert!((luminance(after.energy) / after.fluence - 0.5).abs() < 1e-5, "{after:?}");
+        let seen = |cone: &MomentCone| luminance(cone.energy) / (luminance(cone.energy) + cone.hidden);
+        assert!((seen(&after) - seen(&before)).abs() < 1e-5, "{after:?}");
+    }
 }
 
 #[test]
