@@ -39,6 +39,7 @@ struct Sums {
 }
 
 impl<'a> Surface<'a> {
+    #[inline(always)]
     pub(crate) fn of(point: &'a ShadingPoint) -> Surface<'a> {
         let n_dot_v_signed = point.normal_shading_world.dot(point.to_viewer_world);
         let a2 = point.reflectance.alpha * point.reflectance.alpha;
@@ -47,6 +48,7 @@ impl<'a> Surface<'a> {
 
     /// Radiance that a cone's light leaves towards the viewer, of irradiance on the surface's shading normal. Gloss is so wide that the directions of the
     /// pattern run into each other: each stands for its part of the cone. On smooth surfaces wide cones are mirrored whole, not as dots.
+    #[inline(always)]
     pub(crate) fn reflect(&self, arrival: &Arrival) -> Vec3 {
         let count = self.needed(arrival);
         // Half vectors turn by half of what directions do; α is about the tangent of the lobe's half width.
@@ -93,6 +95,7 @@ impl<'a> Surface<'a> {
     }
 
     /// Directions that a cone needs on this surface, as [`Samples::Adaptive`](crate::slc::Samples::Adaptive).
+    #[inline(always)]
     fn needed(&self, arrival: &Arrival) -> u32 {
         // Chord of the angle, about the angle itself; perceptual roughness squared is alpha.
         let angle = (2.0 * (1.0 - arrival.cos_angle)).max(0.0).sqrt();
@@ -104,6 +107,7 @@ impl<'a> Surface<'a> {
         }
     }
 
+    #[inline(always)]
     fn sums<const N: usize>(&self, arrival: &Arrival, a2: f32, pattern: &Pattern<N>) -> Sums {
         let axis = arrival.direction;
         let (tangent, bitangent) = orthonormal_basis(axis);

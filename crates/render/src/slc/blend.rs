@@ -56,6 +56,7 @@ impl<'a, E: ConeEntry + Caps> Blender<'a, E> {
     }
 
     /// Radiance that a sample reflects towards the viewer.
+    #[inline(always)]
     pub(super) fn reflect(&mut self, point: &ShadingPoint, pixel: &PixelPlace) -> Vec3 {
         let mut reads = [None; ENTRIES];
         let count = self.read(point, pixel, &mut reads);
@@ -134,6 +135,7 @@ impl<'a, E: ConeEntry + Caps> Blender<'a, E> {
     }
 
     /// Entries about a sample whose weight counts, and how many.
+    #[inline(always)]
     fn read(
         &mut self,
         point: &ShadingPoint,
@@ -207,6 +209,7 @@ fn widest_part(point: &ShadingPoint) -> f32 {
     0.5 * chord * chord
 }
 
+#[inline(always)]
 fn fourth(v: f32) -> f32 {
     let v2 = v * v;
     v2 * v2

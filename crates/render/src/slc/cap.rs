@@ -122,6 +122,7 @@ pub(super) struct Ground {
 }
 
 impl<'a> Lens<'a> {
+    #[inline(always)]
     pub(super) fn of(point: &'a ShadingPoint, shading: &SlcShading, lanes: &'a mut Lanes) -> Lens<'a> {
         let n_dot_v_signed = point.normal_shading_world.dot(point.to_viewer_world);
         let n_dot_v = n_dot_v_signed.clamp(1e-3, 1.0);
@@ -145,8 +146,13 @@ impl<'a> Lens<'a> {
     }
 
     /// Adds a cone of an entry, of whose light this part counts.
+    #[inline(always)]
     pub(super) fn add(&mut self, cap: &Cap, ground: &Ground, part: f32) {
-        match self.needed(cap) {
+        let needed = self.needed(cap);
+        if self.used + (needed as usize).min(LANES) > LANES || self.count == WAITING {
+            self.flush();
+        }
+        match needed {
             0..4 => self.spread(cap, ground, part, &*ONE),
             4..8 => self.spread(cap, ground, part, &*FOUR),
             8..16 => self.spread(cap, ground, part, &*EIGHT),
@@ -156,12 +162,14 @@ impl<'a> Lens<'a> {
     }
 
     /// Radiance that the light of all cones leaves towards the viewer.
+    #[inline(always)]
     pub(super) fn radiance(mut self) -> Vec3 {
         self.flush();
         self.radiance
     }
 
     /// Directions that a cone needs on this surface.
+    #[inline(always)]
     fn needed(&self, cap: &Cap) -> u32 {
         match self.samples {
             Samples::Fixed(n) => n,
@@ -174,10 +182,8 @@ impl<'a> Lens<'a> {
 
     /// Puts a cone's directions into the lanes.
     #[allow(clippy::needless_range_loop)] // several lists of lanes at once
+    #[inline(always)]
     fn spread<const N: usize>(&mut self, cap: &Cap, ground: &Ground, part: f32, pattern: &Pattern<N>) {
-        if self.used + N > LANES || self.count == WAITING {
-            self.flush();
-        }
         let (first, axis) = (self.used, cap.direction);
         let lanes = first..first + N;
         let Lanes { x, y, z, .. } = &mut *self.lanes;
@@ -219,6 +225,7 @@ impl<'a> Lens<'a> {
     }
 
     /// Shades what is in the lanes.
+    #[inline(always)]
     fn flush(&mut self) {
         if self.point.reflectance.specular {
             self.flush_glossy();
@@ -229,6 +236,7 @@ impl<'a> Lens<'a> {
     }
 
     #[allow(clippy::needless_range_loop)] // several lists of lanes at once
+    #[inline(always)]
     fn flush_matte(&mut self) {
         let Lanes { x, y, z, diffuse: cosines, waiting, .. } = &mut *self.lanes;
         let (n, s) = (self.point.normal_world, self.point.normal_shading_world);
@@ -250,6 +258,7 @@ impl<'a> Lens<'a> {
 
     /// Schlick's fifth power f splits reflectance into three sums over directions: n·l (1 − f), D V n·l (1 − f), D V n·l f.
     #[allow(clippy::needless_range_loop)] // several lists of lanes at once
+    #[inline(always)]
     fn flush_glossy(&mut self) {
         let Lanes { x, y, z, diffuse, gloss, grazing, waiting } = &mut *self.lanes;
         let (n, s, v) =
@@ -298,7 +307,7 @@ impl<'a> Lens<'a> {
 }
 
 /// Sum of lanes, four chains at a time: one would wait for each addition.
-#[inline]
+#[inline(always)]
 fn sum_of(lane: &[f32]) -> f32 {
     if let [one] = lane {
         return *one;
