@@ -55,6 +55,7 @@ pub fn cone_charts(scene: &Scene) -> (Charting, Vec<String>) {
 pub struct ConeServer<E> {
     cache: ConeCache<E>,
     look_up: LookUp,
+    requests: Requests,
     queue: UpdateQueue,
     places: EntryPlaces,
     before: Option<Pose>,
@@ -109,6 +110,7 @@ impl<E: Update> ConeServer<E> {
         Ok(ConeServer {
             cache: ConeCache::new(cache)?,
             look_up,
+            requests: Requests::default(),
             queue: UpdateQueue::default(),
             places: EntryPlaces::default(),
             before: None,
@@ -124,12 +126,14 @@ impl<E: Update> ConeServer<E> {
         params: &E::Params,
         pass: &mut dyn FnMut(&'static str),
     ) -> ConeStep {
-        let requests = Requests::gather(views, &self.look_up);
+        let is_as_before = self.requests.gather_again(views, &self.look_up);
         pass("requests");
-        self.queue = self.cache.admit(&requests);
+        if !(is_as_before && self.cache.repeat(&mut self.queue)) {
+            self.queue = self.cache.admit(&self.requests);
+        }
         pass("queue");
         let before = self.before.as_ref().unwrap_or(now.pose);
-        self.places = EntryPlaces::of(&self.cache, &self.queue, now.scene, before, now.pose);
+        self.places.follow(&self.cache, &self.queue, now.scene, before, now.pose);
         pass("places");
         let (lights, lights_before) = (now.lights(now.pose), now.lights(before));
         let then = Moment { scene: now.scene, pose: before, lights: &lights_before };
@@ -151,6 +155,12 @@ impl<E: Update> ConeServer<E> {
     /// All entries.
     pub fn cache(&self) -> &ConeCache<E> {
         &self.cache
+    }
+
+    /// When a block last changed by the clock of the cache ([`ConeCache::changed_at`]), or the places of its entries did.
+    pub fn changed_at(&self, block: usize) -> u64 {
+        let moved = self.cache.instance_of(block).map_or(0, |instance| self.places.moved_at(instance));
+        self.cache.changed_at(block).max(moved)
     }
 
     /// Where in the world an entry is that was wanted in the last step.

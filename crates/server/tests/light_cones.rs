@@ -8,7 +8,7 @@ use dapple_render::area_lights::AreaLightTable;
 use dapple_render::gbuffer::{GBuffer, rasterize};
 use dapple_render::image::{LinearImage, Rgb8Image, ToneMap};
 use dapple_render::shade::shading_points;
-use dapple_render::slc::{Blending, CapTable, ConeLight, SlcShading, pixel_places, shade_cones};
+use dapple_render::slc::{Blending, ConeLight, KeptCaps, SlcShading, pixel_places, shade_cones};
 use dapple_scene::area_lights::Pick;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{NoFiles, PosedCamera, Scene, ShadingPoint, builtin};
@@ -120,7 +120,8 @@ fn measure(stage: &Stage, steps: usize, timed: usize, samples: u32) -> Vec<(&'st
         ways.iter_mut().for_each(|lit| lit.step(stage, &now, Some(&seen)));
     }
     for lit in &mut ways {
-        [&mut lit.ms, &mut lit.server_ms].into_iter().chain(&mut lit.stages).for_each(Vec::clear);
+        let times = [&mut lit.ms, &mut lit.server_ms].into_iter().chain(&mut lit.stages);
+        times.chain(&mut lit.passes).for_each(Vec::clear);
     }
     let [_, power, best, _] = Rival::all();
     let mut rivals = [power, best];
@@ -142,8 +143,9 @@ fn measure(stage: &Stage, steps: usize, timed: usize, samples: u32) -> Vec<(&'st
             let [places, caps] = &lit.stages;
             let [all, places, server, caps] = [&lit.ms, places, &lit.server_ms, caps].map(|ms| median(ms));
             let shading = all - places - server - caps;
+            let [requests, queue, sites, rays] = lit.passes.each_ref().map(|ms| median(ms));
             println!(
-                "  {all:.0} ms: places {places:.0}, server {server:.0}, caps {caps:.0}, shading {shading:.0}"
+                "  {all:.1} ms: places {places:.1}, server {server:.1} (requests {requests:.1}, queue {queue:.1}, places {sites:.1}, rays {rays:.1}), caps {caps:.1}, shading {shading:.1}"
             );
         }
         (lit.name, quality)
@@ -303,12 +305,15 @@ impl Rival {
 struct Lit {
     name: &'static str,
     server: ConeServer<MomentEntry>,
+    caps: KeptCaps,
     shading: SlcShading,
     shapes: bool,
     ms: Vec<f64>,
     server_ms: Vec<f64>,
     /// Of those: finding places in the charts, and making caps of entries.
     stages: [Vec<f64>; 2],
+    /// Of the server's: requests, queue, places, rays.
+    passes: [Vec<f64>; 4],
     picture: Vec<Vec3>,
 }
 
@@ -318,11 +323,13 @@ impl Lit {
         Lit {
             name,
             server,
+            caps: KeptCaps::default(),
             shading,
             shapes,
             ms: Vec::new(),
             server_ms: Vec::new(),
-            stages: [Vec::new(), Vec::new()],
+            stages: Default::default(),
+            passes: Default::default(),
             picture: Vec::new(),
         }
     }
@@ -338,13 +345,20 @@ impl Lit {
         let views: Vec<View<'_>> = pixels.iter().map(|pixels| View { width, pixels }).collect();
         let begun = Instant::now();
         self.stages[0].push((begun - start).as_secs_f64() * 1e3);
-        self.server.step(now, &views, &SlcParams::default(), &mut |_| ());
+        let mut last = begun;
+        let mut passes = self.passes.iter_mut();
+        self.server.step(now, &views, &SlcParams::default(), &mut |_| {
+            if let Some(ms) = passes.next() {
+                ms.push(last.elapsed().as_secs_f64() * 1e3);
+            }
+            last = Instant::now();
+        });
         self.server_ms.push(begun.elapsed().as_secs_f64() * 1e3);
         let stepped = Instant::now();
         let table = AreaLightTable::new(&now.lights(now.pose));
         let light = ConeLight { lights: self.shapes.then_some(&table), ..cone_light(&self.server, &table) };
         if let (Some(seen), Some(pixels)) = (seen, pixels) {
-            let caps = CapTable::new(&light);
+            let caps = self.caps.table(&light, |block| self.server.changed_at(block));
             self.stages[1].push(stepped.elapsed().as_secs_f64() * 1e3);
             self.picture = shade_cones(&caps, &seen.points, &pixels, &self.shading);
         }

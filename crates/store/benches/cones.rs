@@ -58,7 +58,7 @@ fn row(views: &[Vec<Option<PixelPlace>>], threads: usize, look_up: LookUp) {
     let (update, _) = fastest(|| {
         cache.update(&queue, |i, queued, entry| {
             // One sample of one of four lights.
-            let light = (i as u32 + queued.samples as u32) % 4;
+            let light = (i as u32 + u32::from(queued.is_new)) % 4;
             let direction = Vec3::new(light as f32 - 1.5, 2.0, (i % 7) as f32 * 0.1).normalize();
             entry.update(&[ConeSample { direction, value: Vec3::ONE, light, cosine: 1.0 }], 1, &params);
             true

@@ -7,7 +7,9 @@ use anyhow::Result;
 use dapple_render::area_lights::AreaLightTable;
 use dapple_render::gbuffer::{GBuffer, rasterize};
 use dapple_render::shade::shading_points;
-use dapple_render::slc::{CapTable, Caps, ConeLight, Form, Samples, SlcShading, pixel_places, shade_cones};
+use dapple_render::slc::{
+    CapTable, Caps, ConeLight, Form, KeptCaps, Samples, SlcShading, pixel_places, shade_cones,
+};
 use dapple_scene::area_lights::{AreaLights, MAX_LIGHT_TRIANGLES, Pick};
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Pose, PosedCamera, Projection, Scene, ShadingPoint};
@@ -164,7 +166,7 @@ pub(crate) enum Lighter {
     Rays { samples: u32, sampler: Sampler, frame: u64 },
     Ris { sampler: Sampler, frame: u64 },
     Restir(Box<Reservoirs>),
-    Paper(Box<(ConeServer<BoundingEntry>, PaperParams, LookUp)>),
+    Paper(Box<PaperCones>),
     Cones(Box<Cones>),
 }
 
@@ -181,10 +183,12 @@ impl Lighter {
                 before: None,
             })),
             Technique::PaperCones { params, look_up } => {
-                Lighter::Paper(Box::new((ConeServer::new(CacheParams::default(), look_up)?, params, look_up)))
+                let server = ConeServer::new(CacheParams::default(), look_up)?;
+                Lighter::Paper(Box::new(PaperCones { server, caps: KeptCaps::default(), params, look_up }))
             }
             Technique::Cones(how) => Lighter::Cones(Box::new(Cones {
                 server: ConeServer::new(CacheParams::default(), how.shading.look_up)?,
+                caps: KeptCaps::default(),
                 how,
                 card: how.on_card.then(Card::new).transpose()?,
             })),
@@ -252,7 +256,7 @@ impl Lighter {
                 found
             }
             Lighter::Paper(of) => {
-                let (server, params, look_up) = &mut **of;
+                let PaperCones { server, caps, params, look_up } = &mut **of;
                 let shading = SlcShading {
                     look_up: *look_up,
                     form: Form::Fluence,
@@ -260,14 +264,14 @@ impl Lighter {
                     ..SlcShading::default()
                 };
                 with_cones(server, now, seen, charting, params, pass, |server, pixels| {
-                    Ok(shade_all(&cap_table(server, None), seen, pixels, &shading))
+                    Ok(shade_all(&cap_table(caps, server, None), seen, pixels, &shading))
                 })?
             }
             Lighter::Cones(of) => {
-                let Cones { server, how: OurCones { params, shading, shapes, .. }, card } = &mut **of;
+                let Cones { server, caps, how: OurCones { params, shading, shapes, .. }, card } = &mut **of;
                 let table = shapes.then(|| AreaLightTable::new(lights));
                 with_cones(server, now, seen, charting, params, pass, |server, pixels| {
-                    let caps = cap_table(server, table.as_ref());
+                    let caps = cap_table(caps, server, table.as_ref());
                     match card {
                         Some(card) => card.shade_all(&caps, seen, pixels, shading),
                         None => Ok(shade_all(&caps, seen, pixels, shading)),
@@ -278,9 +282,18 @@ impl Lighter {
     }
 }
 
+/// The paper's cones at work.
+pub(crate) struct PaperCones {
+    server: ConeServer<BoundingEntry>,
+    caps: KeptCaps,
+    params: PaperParams,
+    look_up: LookUp,
+}
+
 /// Our cones at work.
 pub(crate) struct Cones {
     server: ConeServer<MomentEntry>,
+    caps: KeptCaps,
     how: OurCones,
     card: Option<Card>,
 }
@@ -371,10 +384,12 @@ fn with_cones<E: Update>(
 }
 
 fn cap_table<'a, E: Update + Caps>(
+    caps: &mut KeptCaps,
     server: &'a ConeServer<E>,
     lights: Option<&'a AreaLightTable>,
 ) -> CapTable<'a, E> {
-    CapTable::new(&ConeLight { cache: server.cache(), place_of: |id| server.place_of(id), lights })
+    let light = ConeLight { cache: server.cache(), place_of: |id| server.place_of(id), lights };
+    caps.table(&light, |block| server.changed_at(block))
 }
 
 fn shade_all<E: ConeEntry + Caps>(

@@ -25,7 +25,7 @@ use rayon::prelude::*;
 use crate::area_lights::AreaLightTable;
 pub use cap::{Cap, Form, Samples};
 pub use places::pixel_places;
-pub use table::CapTable;
+pub use table::{CapTable, KeptCaps};
 
 /// How much a cone is of a light.
 #[derive(Clone, Copy, Debug, PartialEq)]

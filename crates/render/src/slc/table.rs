@@ -1,6 +1,9 @@
 //! What shading reads of a cache: cones as caps, and where entries are, close together and each made once, however many samples of however many viewers
 //! read it.
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use dapple_store::cones::{BLOCK_TEXELS, ConeCache, ConeEntry, EntryId, EntrySite};
 use rayon::prelude::*;
 
@@ -69,6 +72,8 @@ struct Chunk {
     caps: Vec<TableCap>,
     /// Place in `entries` of each texel of the blocks; [`NO_PLACE`] where there is none.
     place_of: Vec<u16>,
+    /// [`ConeCache::clock`] when it was made.
+    clock: u64,
 }
 
 const NO_PLACE: u16 = u16::MAX;
@@ -77,38 +82,80 @@ const NO_PLACE: u16 = u16::MAX;
 const _: () = assert!(CHUNK_TEXELS < NO_PLACE as usize);
 
 /// Entries of a cache at one moment, ready to be shaded: [`ConeLight`] turned into caps.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct CapTable<'a, E> {
     pub(super) cache: &'a ConeCache<E>,
     pub(super) lights: Option<&'a AreaLightTable>,
-    chunks: Vec<Chunk>,
+    chunks: Vec<Arc<Chunk>>,
+}
+
+/// Caps of a cache that are kept from one moment to the next, so that only those of blocks in which something changed are made.
+#[derive(Debug, Default)]
+pub struct KeptCaps {
+    chunks: Vec<Arc<Chunk>>,
+    /// The lights that have forms, and their places in the table.
+    slots: Option<Vec<(u32, usize)>>,
+}
+
+impl KeptCaps {
+    /// What [`CapTable::new`] gives. `changed_at` says of a block ([`ConeCache::changed_at`]) when its entries or their places in the world last changed,
+    /// by the cache's clock. Always of the same cache.
+    pub fn table<'a, E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite> + Sync>(
+        &mut self,
+        light: &ConeLight<'a, E, F>,
+        changed_at: impl Fn(usize) -> u64 + Sync,
+    ) -> CapTable<'a, E> {
+        let slots = light.lights.map(|table| {
+            let shown = table.lights().iter();
+            shown.filter_map(|light| Some((*light, table.slot_of_form(*light)?))).collect::<Vec<_>>()
+        });
+        if self.slots != slots {
+            (self.chunks, self.slots) = (Vec::new(), slots);
+        }
+        let end = light.cache.end_block();
+        let count = end.div_ceil(CHUNK_BLOCKS);
+        let held = &self.chunks;
+        let chunk = |number: usize| {
+            let blocks = number * CHUNK_BLOCKS..(number + 1) * CHUNK_BLOCKS;
+            let is_same = |chunk: &Arc<Chunk>| {
+                blocks.clone().take_while(|block| *block < end).all(|block| changed_at(block) <= chunk.clock)
+            };
+            let kept = held.get(number).filter(|chunk| is_same(chunk)).cloned();
+            kept.unwrap_or_else(|| Arc::new(Chunk::new(light, blocks)))
+        };
+        self.chunks = (0..count).into_par_iter().map(chunk).collect();
+        CapTable { cache: light.cache, lights: light.lights, chunks: self.chunks.clone() }
+    }
+}
+
+impl Chunk {
+    fn new<E: ConeEntry + Caps, F: Fn(EntryId) -> Option<EntrySite>>(
+        light: &ConeLight<'_, E, F>,
+        blocks: Range<usize>,
+    ) -> Chunk {
+        let (mut entries, mut caps, mut place_of) = (Vec::new(), Vec::new(), vec![NO_PLACE; CHUNK_TEXELS]);
+        for id in light.cache.ids_of_blocks(blocks) {
+            let Some((site, entry)) = (light.place_of)(id).zip(light.cache.entry(id)) else { continue };
+            let first = caps.len();
+            entry.each_cap(|cap, seen| caps.push(TableCap::new(cap, seen, light.lights)));
+            let count = (caps.len() - first) as u32;
+            place_of[id.index() % CHUNK_TEXELS] = entries.len() as u16;
+            entries.push(TableEntry {
+                #[cfg(feature = "gpu")]
+                id,
+                site,
+                first: first as u32,
+                count,
+            });
+        }
+        Chunk { entries, caps, place_of, clock: light.cache.clock() }
+    }
 }
 
 impl<'a, E: ConeEntry + Caps> CapTable<'a, E> {
     /// Of all entries that have a place, in parallel in the caller's rayon pool.
     pub fn new<F: Fn(EntryId) -> Option<EntrySite> + Sync>(light: &ConeLight<'a, E, F>) -> CapTable<'a, E> {
-        let chunk = |number: usize| {
-            let blocks = number * CHUNK_BLOCKS..(number + 1) * CHUNK_BLOCKS;
-            let mut chunk =
-                Chunk { entries: Vec::new(), caps: Vec::new(), place_of: vec![NO_PLACE; CHUNK_TEXELS] };
-            for id in light.cache.ids_of_blocks(blocks) {
-                let Some((site, entry)) = (light.place_of)(id).zip(light.cache.entry(id)) else { continue };
-                let first = chunk.caps.len();
-                entry.each_cap(|cap, seen| chunk.caps.push(TableCap::new(cap, seen, light.lights)));
-                let count = (chunk.caps.len() - first) as u32;
-                chunk.place_of[id.index() % CHUNK_TEXELS] = chunk.entries.len() as u16;
-                chunk.entries.push(TableEntry {
-                    #[cfg(feature = "gpu")]
-                    id,
-                    site,
-                    first: first as u32,
-                    count,
-                });
-            }
-            chunk
-        };
-        let chunks = (0..light.cache.end_block().div_ceil(CHUNK_BLOCKS)).into_par_iter().map(chunk).collect();
-        CapTable { cache: light.cache, lights: light.lights, chunks }
+        KeptCaps::default().table(light, |_| 0)
     }
 
     /// Where an entry is, and its cones; `None` if it has no place.

@@ -26,6 +26,12 @@ pub struct EntryPlaces {
     places: Vec<EntryPlace>,
     /// Index in the queue of an entry, by its number; `u32::MAX` for those that are not in it.
     of_entry: Vec<u32>,
+    /// Frame of the queue.
+    frame: u32,
+    /// The cache's clock when an instance was last found to have moved.
+    moved_at: Vec<u64>,
+    /// Whether everything is where it was.
+    all_still: bool,
 }
 
 impl EntryPlaces {
@@ -37,6 +43,21 @@ impl EntryPlaces {
         before: &Pose,
         now: &Pose,
     ) -> EntryPlaces {
+        let mut places = EntryPlaces::default();
+        places.follow(cache, queue, scene, before, now);
+        places
+    }
+
+    /// Turns the places of the frame before, found in the pose `before` of the same scene, into what [`EntryPlaces::of`] would give: what stayed where it
+    /// was is not looked up again.
+    pub fn follow<E: ConeEntry>(
+        &mut self,
+        cache: &ConeCache<E>,
+        queue: &UpdateQueue,
+        scene: &Scene,
+        before: &Pose,
+        now: &Pose,
+    ) {
         let still: Vec<bool> = (0..now.instances.len())
             .map(|i| match (before.instances.get(i), &now.instances[i]) {
                 (Some(then), now) => {
@@ -47,7 +68,34 @@ impl EntryPlaces {
                 (None, _) => false,
             })
             .collect();
+        self.moved_at.resize(still.len(), 0);
+        for (at, still) in self.moved_at.iter_mut().zip(&still) {
+            if !still {
+                *at = cache.clock();
+            }
+        }
+        let follows = self.frame != 0 && self.frame.wrapping_add(1) == queue.frame();
+        self.frame = queue.frame();
+        let all_still = !still.contains(&false);
+        if follows && queue.is_repeat() && all_still && self.all_still {
+            return;
+        }
+        self.all_still = all_still;
+        let is_still = |instance: u32| still.get(instance as usize) == Some(&true);
         let place = |texel: &dapple_store::cones::QueuedTexel| {
+            let stayed = follows && !texel.is_new && !texel.moved && texel.absent == 0;
+            if stayed
+                && is_still(texel.instance)
+                && let Some(index) = self.of_entry.get(texel.id.index())
+                && let Some(held) = self.places.get(*index as usize)
+            {
+                let (position, normal) = (held.position_world, held.normal_shading_world);
+                return EntryPlace {
+                    position_before_world: position,
+                    normal_shading_before_world: normal,
+                    ..*held
+                };
+            }
             let side =
                 if cache.key(texel.id).is_some_and(|key| key.block.chart & BACK != 0) { -1.0 } else { 1.0 };
             let at = |pose| world_place(scene, pose, texel.instance, &texel.place, side);
@@ -55,7 +103,7 @@ impl EntryPlaces {
                 return EntryPlace::default();
             };
             // Between two equal poses nothing is to be found out.
-            let then = if still.get(texel.instance as usize) == Some(&true) { None } else { at(before) };
+            let then = if is_still(texel.instance) { None } else { at(before) };
             let [position_before_world, _, normal_shading_before_world] =
                 then.unwrap_or([position_world, normal_world, normal_shading_world]);
             EntryPlace {
@@ -66,13 +114,21 @@ impl EntryPlaces {
                 normal_shading_before_world,
             }
         };
-        let places: Vec<EntryPlace> = queue.texels.par_iter().with_min_len(1024).map(place).collect();
-        let last = queue.texels.iter().map(|t| t.id.index()).max();
-        let mut of_entry = vec![u32::MAX; last.map_or(0, |i| i + 1)];
-        for (i, texel) in (0u32..).zip(&queue.texels) {
-            of_entry[texel.id.index()] = i;
+        self.places = queue.texels.par_iter().with_min_len(1024).map(place).collect();
+        if follows && queue.is_repeat() {
+            return;
         }
-        EntryPlaces { places, of_entry }
+        let last = queue.texels.iter().map(|t| t.id.index()).max();
+        self.of_entry.clear();
+        self.of_entry.resize(last.map_or(0, |i| i + 1), u32::MAX);
+        for (i, texel) in (0u32..).zip(&queue.texels) {
+            self.of_entry[texel.id.index()] = i;
+        }
+    }
+
+    /// The cache's clock ([`ConeCache::clock`]) when an instance was last found to have moved; 0 if it never did.
+    pub fn moved_at(&self, instance: u32) -> u64 {
+        self.moved_at.get(instance as usize).copied().unwrap_or(0)
     }
 
     /// Of the queue's texel with that index, if its instance is there.

@@ -16,10 +16,6 @@ pub struct QueuedTexel {
     pub instance: u32,
     /// The place on the surface that it stands for.
     pub place: TexelPlace,
-    /// Frames since the last update; `u32::MAX` if there was none.
-    pub age: u32,
-    /// Samples that the entry stands for.
-    pub samples: u16,
     /// Whether it got its place in this frame. If it has samples, they are those of an entry of another level.
     pub is_new: bool,
     /// Whether its place became another: until now only pixels beside it had asked for it.
@@ -40,6 +36,22 @@ pub struct UpdateQueue {
     /// Requests for texels of blocks that there was no room for, counted once a tile of pixels.
     pub refused: u32,
     pub(super) frame: u32,
+    /// [`ConeCache::releases`] when it was made.
+    releases: u64,
+    /// Whether the frame before had the same.
+    is_repeat: bool,
+}
+
+impl UpdateQueue {
+    /// Number of the frame that it is of.
+    pub fn frame(&self) -> u32 {
+        self.frame
+    }
+
+    /// Whether it has the texels of the frame before, in the same order ([`ConeCache::repeat`]).
+    pub fn is_repeat(&self) -> bool {
+        self.is_repeat
+    }
 }
 
 impl<E: ConeEntry> ConeCache<E> {
@@ -47,10 +59,10 @@ impl<E: ConeEntry> ConeCache<E> {
     /// that were not wanted for longest make room; those wanted now never do, so what does not fit is refused. In parallel in the caller's
     /// rayon pool.
     pub fn admit(&mut self, requests: &Requests) -> UpdateQueue {
-        // Frame 0 is before all, so that an entry never updated has no age.
-        self.frame = self.frame.wrapping_add(1).max(1);
-        for head in &mut self.heads {
-            (head.wanted, head.moved) = (0, 0);
+        let last = self.begin_frame();
+        for (head, body) in self.heads.iter_mut().zip(&mut self.bodies) {
+            bits(head.wanted).for_each(|texel| body.wanted[texel] = last);
+            (head.before, head.wanted, head.moved) = (head.wanted, 0, 0);
         }
         let mut queue = UpdateQueue { frame: self.frame, ..UpdateQueue::default() };
         let blocks = || requests.tiles.iter().flat_map(|t| t.blocks.iter().map(move |b| (b, &t.places)));
@@ -88,7 +100,42 @@ impl<E: ConeEntry> ConeCache<E> {
             asked[index_of[slot] as usize].requests.push((request.wanted, &places[request.first as usize..]));
         }
         self.enqueue(&asked, &index_of, &mut queue);
+        for head in &mut self.heads {
+            if head.wanted != head.before || head.moved != 0 {
+                head.changed = self.clock;
+            }
+        }
+        queue.releases = self.releases;
         queue
+    }
+
+    /// Begins a frame with what the last one had: the same as [`ConeCache::admit`] with the same requests, in next to no time. `queue` is the last
+    /// frame's and becomes this one's. `false`, and nothing is done, if it is not the last, if blocks were removed since, or if something was refused,
+    /// for which there may be room now.
+    #[must_use]
+    pub fn repeat(&mut self, queue: &mut UpdateQueue) -> bool {
+        if queue.frame != self.frame || queue.releases != self.releases || queue.refused > 0 {
+            return false;
+        }
+        self.begin_frame();
+        for head in self.heads.iter_mut().filter(|head| head.wanted != 0) {
+            (head.before, head.moved, head.last_wanted) = (head.wanted, 0, self.frame);
+        }
+        if !queue.is_repeat {
+            for texel in &mut queue.texels {
+                (texel.is_new, texel.moved, texel.absent) = (false, false, 0);
+            }
+        }
+        (queue.reused, queue.evicted, queue.frame, queue.is_repeat) = (0, 0, self.frame, true);
+        true
+    }
+
+    /// Returns the number of the frame before.
+    fn begin_frame(&mut self) -> u32 {
+        self.clock += 1;
+        // Frame 0 is before all.
+        let next = self.frame.wrapping_add(1).max(1);
+        std::mem::replace(&mut self.frame, next)
     }
 
     /// Finds the places of wanted texels, lists these, and begins the new ones. Blocks do not look at what becomes of each other.
@@ -169,7 +216,10 @@ impl<E: ConeEntry> ConeCache<E> {
             known: 0,
             sampled: 0,
             wanted: 0,
+            own: 0,
             moved: 0,
+            before: 0,
+            changed: self.clock,
             last_wanted: self.frame,
             first_queued: 0,
             is_used: true,
@@ -217,8 +267,7 @@ impl<E: ConeEntry> ConeCache<E> {
         let slot = *self.slot_of.get(&key.block)? as usize;
         let texel = usize::from(key.texel);
         debug_assert!(texel < BLOCK_TEXELS);
-        let body = &self.bodies[slot];
-        (self.heads[slot].known >> texel & 1 == 1 && body.updated[texel] != 0).then(|| &body.entries[texel])
+        (self.heads[slot].own >> texel & 1 == 1).then(|| &self.bodies[slot].entries[texel])
     }
 }
 
@@ -262,22 +311,16 @@ impl<E: ConeEntry> Block<'_, E> {
             if is_new {
                 let begin = begins.next_if(|(of, _)| *of == texel);
                 body.entries[texel] = begin.map_or_else(E::default, |(_, entry)| entry);
-                body.updated[texel] = 0;
+                head.own &= !(1 << texel);
                 head.note_samples(texel, &body.entries[texel]);
             }
-            let last = std::mem::replace(&mut body.wanted[texel], frame);
             *out = QueuedTexel {
                 id: EntryId::new(self.slot, texel),
                 instance: head.key.instance,
                 place: body.places[texel],
-                age: match body.updated[texel] {
-                    0 => u32::MAX,
-                    updated => frame.wrapping_sub(updated),
-                },
-                samples: body.entries[texel].confidence(),
                 is_new,
                 moved: head.moved >> texel & 1 == 1,
-                absent: if is_new { 0 } else { frame.wrapping_sub(last).saturating_sub(1) },
+                absent: if is_new { 0 } else { frame.wrapping_sub(body.wanted[texel]).saturating_sub(1) },
             };
         }
         head.known |= head.wanted;

@@ -107,8 +107,14 @@ struct Head {
     wanted: u64,
     /// Texels whose entry has samples: what a reader asks first.
     sampled: u64,
+    /// Texels whose entry was updated since it began: what others may begin with.
+    own: u64,
     /// Texels whose place became another in this frame.
     moved: u64,
+    /// Texels wanted in the frame before.
+    before: u64,
+    /// [`ConeCache::clock`] of its last change.
+    changed: u64,
     last_wanted: u32,
     /// Where its texels are in this frame's queue.
     first_queued: u32,
@@ -127,9 +133,7 @@ impl Head {
 #[derive(Clone, Debug)]
 struct Body<E> {
     places: [TexelPlace; BLOCK_TEXELS],
-    /// Frame of the last update.
-    updated: [u32; BLOCK_TEXELS],
-    /// When somebody last wanted it.
+    /// When somebody last wanted it, before this frame.
     wanted: [u32; BLOCK_TEXELS],
     entries: [E; BLOCK_TEXELS],
 }
@@ -138,7 +142,6 @@ impl<E: ConeEntry> Body<E> {
     fn empty() -> Box<Body<E>> {
         Box::new(Body {
             places: [TexelPlace::default(); BLOCK_TEXELS],
-            updated: [0; BLOCK_TEXELS],
             wanted: [0; BLOCK_TEXELS],
             entries: std::array::from_fn(|_| E::default()),
         })
@@ -167,6 +170,9 @@ pub struct ConeCache<E> {
     /// Slots that wait to be used again.
     free: Vec<u32>,
     frame: u32,
+    clock: u64,
+    /// Blocks that were ever removed.
+    releases: u64,
 }
 
 impl<E: ConeEntry> ConeCache<E> {
@@ -184,6 +190,8 @@ impl<E: ConeEntry> ConeCache<E> {
             bodies: Vec::new(),
             free: Vec::new(),
             frame: 0,
+            clock: 0,
+            releases: 0,
         })
     }
 
@@ -210,6 +218,24 @@ impl<E: ConeEntry> ConeCache<E> {
         self.frame
     }
 
+    /// Goes up with all that may change an entry.
+    pub fn clock(&self) -> u64 {
+        self.clock
+    }
+
+    /// When a block last changed, by [`ConeCache::clock`]: which of its texels are wanted, their places or their entries. `block` is the number of any
+    /// of its entries divided by [`BLOCK_TEXELS`].
+    #[inline]
+    pub fn changed_at(&self, block: usize) -> u64 {
+        self.heads.get(block).map_or(0, |head| head.changed)
+    }
+
+    /// The instance that a block is of.
+    #[inline]
+    pub fn instance_of(&self, block: usize) -> Option<u32> {
+        self.heads.get(block).filter(|head| head.is_used).map(|head| head.key.instance)
+    }
+
     /// Updates entries of this frame's queue in parallel, in the caller's thread pool: `update` gets the index in the queue, what
     /// stands there, and the entry, and says whether it did anything. Returns how many entries it did.
     ///
@@ -224,16 +250,20 @@ impl<E: ConeEntry> ConeCache<E> {
             let (name, rule) = ("frame of the queue", "it must be the cache's last one");
             return Err(ConeError::BadParameter { name, value: f64::from(queue.frame), rule });
         }
-        let frame = self.frame;
+        self.clock += 1;
+        let clock = self.clock;
         let done = self.heads.par_iter_mut().zip(&mut self.bodies).map(|(head, body)| {
             let mut done = 0;
             for (index, texel) in (head.first_queued as usize..).zip(bits(head.wanted)) {
                 let Some(queued) = queue.texels.get(index) else { break };
                 if update(index, queued, &mut body.entries[texel]) {
-                    body.updated[texel] = frame;
+                    head.own |= 1 << texel;
                     head.note_samples(texel, &body.entries[texel]);
                     done += 1;
                 }
+            }
+            if done > 0 {
+                head.changed = clock;
             }
             done
         });
@@ -256,6 +286,8 @@ impl<E: ConeEntry> ConeCache<E> {
         let entry = &mut self.bodies[id.slot()].entries[id.texel()];
         change(entry);
         head.note_samples(id.texel(), entry);
+        self.clock += 1;
+        head.changed = self.clock;
         true
     }
 
@@ -307,9 +339,12 @@ impl<E: ConeEntry> ConeCache<E> {
 
     /// Forgets a block. Its memory waits to be used again.
     fn release(&mut self, slot: usize) {
+        self.clock += 1;
+        self.releases += 1;
         let head = &mut self.heads[slot];
         self.slot_of.remove(&head.key);
-        (head.is_used, head.known, head.sampled, head.wanted, head.moved) = (false, 0, 0, 0, 0);
+        (head.is_used, head.known, head.sampled, head.own, head.wanted, head.moved) = (false, 0, 0, 0, 0, 0);
+        head.changed = self.clock;
         self.free.push(slot as u32);
     }
 }

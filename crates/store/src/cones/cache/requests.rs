@@ -116,9 +116,21 @@ pub(super) struct BlockRequest {
     pub(super) first: u32,
 }
 
+/// A tile of pixels of a view.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Tile {
+    view: usize,
+    left: usize,
+    top: usize,
+}
+
 /// What one tile of pixels wants, each texel once.
 #[derive(Clone, Debug, Default)]
 pub(super) struct TileRequests {
+    tile: Tile,
+    /// Pixels of a row of the tile, and all of them.
+    across: usize,
+    pixels: Vec<Option<PixelPlace>>,
     pub(super) blocks: Vec<BlockRequest>,
     pub(super) places: Vec<TexelPlace>,
 }
@@ -127,31 +139,74 @@ pub(super) struct TileRequests {
 #[derive(Clone, Debug, Default)]
 pub struct Requests {
     pub(super) tiles: Vec<TileRequests>,
+    /// What they were gathered with.
+    look_up: Option<LookUp>,
 }
 
 impl Requests {
     /// Collects what the viewers' pixels need, tile by tile, in the caller's thread pool. Pixels whose place is no number are
     /// left out.
     pub fn gather(views: &[View<'_>], look_up: &LookUp) -> Requests {
-        let tiles: Vec<(usize, usize, usize)> = views
-            .iter()
-            .enumerate()
-            .flat_map(|(i, view)| {
-                let (width, rows) = (view.width.max(1), view.pixels.len().div_ceil(view.width.max(1)));
-                let across = width.div_ceil(TILE);
-                (0..across * rows.div_ceil(TILE)).map(move |t| (i, t % across * TILE, t / across * TILE))
+        let mut requests = Requests::default();
+        requests.gather_again(views, look_up);
+        requests
+    }
+
+    /// Turns what was gathered before into what [`Requests::gather`] would give now; tiles whose pixels are the same are not looked at again. Says
+    /// whether all are.
+    pub fn gather_again(&mut self, views: &[View<'_>], look_up: &LookUp) -> bool {
+        let tiles = views.iter().enumerate().flat_map(|(view, View { width, pixels })| {
+            let (width, rows) = ((*width).max(1), pixels.len().div_ceil((*width).max(1)));
+            let across = width.div_ceil(TILE);
+            (0..across * rows.div_ceil(TILE)).map(move |t| Tile {
+                view,
+                left: t % across * TILE,
+                top: t / across * TILE,
             })
-            .collect();
-        let tiles = tiles
-            .into_par_iter()
-            .map_init(Scratch::default, |scratch, (view, x, y)| scratch.gather(&views[view], x, y, look_up))
-            .collect();
-        Requests { tiles }
+        });
+        let tiles: Vec<Tile> = tiles.collect();
+        let is_as_before = self.look_up == Some(*look_up) && self.tiles.len() == tiles.len();
+        if self.look_up != Some(*look_up) {
+            self.tiles.clear();
+        }
+        self.look_up = Some(*look_up);
+        self.tiles.resize_with(tiles.len(), TileRequests::default);
+        let each = self.tiles.par_iter_mut().zip(tiles);
+        let same = each.map_init(Scratch::default, |scratch, (held, tile)| {
+            let view = &views[tile.view];
+            if held.is_of(tile, view) {
+                return true;
+            }
+            *held = scratch.gather(view, tile, look_up);
+            false
+        });
+        same.reduce(|| true, |a, b| a && b) && is_as_before
     }
 
     /// Texels wanted, counted once in each tile of 64×64 pixels.
     pub fn texel_count(&self) -> usize {
         self.tiles.iter().map(|tile| tile.places.len()).sum()
+    }
+}
+
+impl Tile {
+    /// Pixels of each of its rows.
+    fn rows<'v>(self, view: &View<'v>) -> impl Iterator<Item = &'v [Option<PixelPlace>]> {
+        let (width, pixels) = (view.width.max(1), view.pixels);
+        let rows = self.top..(self.top + TILE).min(pixels.len().div_ceil(width));
+        rows.map(move |y| {
+            let row = &pixels[y * width..((y + 1) * width).min(pixels.len())];
+            &row[self.left.min(row.len())..(self.left + TILE).min(row.len())]
+        })
+    }
+}
+
+impl TileRequests {
+    /// Whether it is what this tile wants. Pixels that are no number are not even the same as themselves.
+    fn is_of(&self, tile: Tile, view: &View<'_>) -> bool {
+        let mut held = self.pixels.chunks(self.across.max(1));
+        let mut rows = tile.rows(view).filter(|row| !row.is_empty());
+        self.tile == tile && rows.all(|row| held.next() == Some(row)) && held.next().is_none()
     }
 }
 
@@ -242,22 +297,22 @@ struct Block {
 const _: () = assert!(TILE * TILE * 5 <= 1 << 16);
 
 impl Scratch {
-    fn gather(&mut self, view: &View<'_>, left: usize, top: usize, look_up: &LookUp) -> TileRequests {
+    fn gather(&mut self, view: &View<'_>, tile: Tile, look_up: &LookUp) -> TileRequests {
         self.block_of.clear();
         self.blocks.clear();
         self.places.clear();
-        let width = view.width.max(1);
-        for y in top..top + TILE {
-            let row = (y * width).min(view.pixels.len())..((y + 1) * width).min(view.pixels.len());
-            let row = &view.pixels[row];
-            let row = &row[left.min(row.len())..(left + TILE).min(row.len())];
+        let (mut across, mut pixels) = (0, Vec::new());
+        for row in tile.rows(view) {
+            across = across.max(row.len());
+            pixels.extend_from_slice(row);
             // The block that was asked last is likely to be asked again.
             let mut last = 0;
             for pixel in row.iter().flatten() {
                 self.want(pixel, look_up, &mut last);
             }
         }
-        self.flatten()
+        let (blocks, places) = self.flatten();
+        TileRequests { tile, across, pixels, blocks, places }
     }
 
     fn want(&mut self, pixel: &PixelPlace, look_up: &LookUp, last: &mut usize) {
@@ -297,7 +352,7 @@ impl Scratch {
     }
 
     /// The places in the order of blocks and texels.
-    fn flatten(&self) -> TileRequests {
+    fn flatten(&self) -> (Vec<BlockRequest>, Vec<TexelPlace>) {
         let mut places = Vec::with_capacity(self.places.len());
         let blocks = self
             .blocks
@@ -308,7 +363,7 @@ impl Scratch {
                 BlockRequest { key: block.key, wanted: block.wanted, first }
             })
             .collect();
-        TileRequests { blocks, places }
+        (blocks, places)
     }
 }
 

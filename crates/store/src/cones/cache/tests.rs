@@ -117,7 +117,7 @@ fn a_picture_asks_for_each_texel_once_and_the_pixel_nearest_to_the_centre_gives_
         for queued in &queue.texels {
             let key = cache.key(queued.id).unwrap();
             assert_eq!((key.block.instance, key.block.chart, key.block.level), (5, 2, -1));
-            assert!(queued.is_new && !queued.moved && queued.age == u32::MAX && queued.samples == 0);
+            assert!(queued.is_new && !queued.moved && cache.entry(queued.id).unwrap().samples() == 0);
             assert_eq!(seen.insert(key.xy(), queued.place), None, "twice");
         }
         for (texel, (_, triangle)) in &best {
@@ -217,30 +217,33 @@ fn a_texel_keeps_its_place_and_its_age_unless_only_neighbours_had_asked() {
         if update {
             update_all(&mut cache, &queue);
         }
-        queue.texels
+        let samples = queue.texels.iter().map(|queued| cache.entry(queued.id).unwrap().samples());
+        let samples: Vec<u16> = samples.collect();
+        (queue.texels, samples)
     };
     // Texels 3 (its own) and 4 (beside it).
-    let first = admit(&at(3.7, 10), true);
+    let (first, _) = admit(&at(3.7, 10), true);
     assert_eq!(
         first.iter().map(|q| (q.place.is_inside(), q.place.triangle)).collect::<Vec<_>>(),
         [(true, 10), (false, 10)]
     );
     // Nearer to the centre of 3, but the place is given.
-    let second = admit(&at(3.5, 11), false);
+    let (second, samples) = admit(&at(3.5, 11), false);
     assert_eq!(second.len(), 1);
     assert!(second[0].place == first[0].place && !second[0].is_new && !second[0].moved);
-    assert_eq!((second[0].age, second[0].samples), (1, 1));
+    assert_eq!(samples, [1]);
     // Texel 4 gets a place inside, and says so.
-    let third = admit(&at(4.6, 12), false);
-    let of_4 = third.iter().find(|q| q.id == first[1].id).unwrap();
+    let (third, samples) = admit(&at(4.6, 12), false);
+    let index = third.iter().position(|q| q.id == first[1].id).unwrap();
+    let of_4 = &third[index];
     assert!(of_4.moved && of_4.place.is_inside() && of_4.place.triangle == 12);
-    assert_eq!((of_4.age, of_4.samples, of_4.is_new), (2, 1, false));
+    assert_eq!((samples[index], of_4.is_new), (1, false));
     assert_eq!(of_4.absent, 1, "not wanted in the second frame");
-    let fourth = admit(&at(4.5, 13), false);
+    let (fourth, _) = admit(&at(4.5, 13), false);
     assert!(!fourth[0].moved && fourth[0].place.triangle == 12 && fourth[0].absent == 0);
     // Nobody looks for two frames.
-    assert!(admit(&[None], false).is_empty() && admit(&[None], false).is_empty());
-    let fifth = admit(&at(4.5, 13), false);
+    assert!(admit(&[None], false).0.is_empty() && admit(&[None], false).0.is_empty());
+    let (fifth, _) = admit(&at(4.5, 13), false);
     assert!(fifth[0].absent == 2 && !fifth[0].is_new);
 }
 
@@ -264,7 +267,8 @@ fn new_entries_begin_with_those_of_other_levels() {
         let queue = cache.admit(&Requests::gather(&[View { width: 64, pixels: &new }], &NEAREST));
         assert_eq!((queue.reused, queue.texels.len()), (64 * 64, 64 * 64), "level {level}");
         for queued in &queue.texels {
-            assert!(queued.is_new && queued.samples == CacheParams::default().reuse_samples);
+            assert!(queued.is_new);
+            assert_eq!(cache.entry(queued.id).unwrap().samples(), CacheParams::default().reuse_samples);
             assert!((cache.entry(queued.id).unwrap().energy().y - 3.0).abs() < 1e-5);
         }
     }
@@ -438,11 +442,13 @@ proptest! {
                 prop_assert_eq!(cache.find(&key), Some(queued.id));
                 let held = plain.get(&key);
                 prop_assert_eq!(queued.is_new, held.is_none());
-                if let Some((updated, samples)) = held {
-                    prop_assert_eq!(queued.age, if *updated == 0 { u32::MAX } else { frame - updated });
-                    prop_assert_eq!(u32::from(queued.samples), *samples);
+                if let Some((wanted, samples)) = held {
+                    prop_assert_eq!(queued.absent, frame - wanted - 1);
+                    prop_assert_eq!(u32::from(cache.entry(queued.id).unwrap().samples()), *samples);
                 }
             }
+            let began: Vec<u32> =
+                queue.texels.iter().map(|queued| u32::from(cache.entry(queued.id).unwrap().samples())).collect();
             // Every other one gets a sample.
             let done = cache.update(&queue, |i, _, entry| {
                 if i % 2 == 0 {
@@ -452,15 +458,80 @@ proptest! {
             });
             prop_assert_eq!(done, Ok(queue.texels.len().div_ceil(2) as u64));
             for (i, queued) in queue.texels.iter().enumerate() {
-                let held = plain.entry(cache.key(queued.id).unwrap()).or_insert((0, u32::from(queued.samples)));
-                if i % 2 == 0 {
-                    *held = (frame, (held.1 + 1).min(255));
-                }
+                let held = plain.entry(cache.key(queued.id).unwrap()).or_insert((frame, began[i]));
+                *held = (frame, (held.1 + u32::from(i % 2 == 0)).min(255));
             }
             prop_assert_eq!(cache.counts().entries, plain.len() as u64);
             let ids: Vec<_> = cache.ids().map(|id| cache.key(id).unwrap()).collect();
             prop_assert_eq!(ids.len(), plain.len());
             prop_assert!(ids.iter().all(|key| plain.contains_key(key)));
+        }
+    }
+
+    /// What is repeated, and what is gathered again, is as if it were done anew.
+    #[test]
+    fn repeating_is_the_same_as_asking_again(
+        frames in prop::collection::vec((0u32..3, 1usize..70, 0u32..3), 2..6), few in any::<bool>(),
+    ) {
+        let mut cache = cache(if few { 12 } else { 100_000 });
+        let mut requests = Requests::default();
+        for (seed, width, repeats) in frames {
+            let pixels = scattered(seed, 4000);
+            let views = [View { width, pixels: &pixels }];
+            requests.gather_again(&views, &LookUp::default());
+            let anew = Requests::gather(&views, &LookUp::default());
+            let mut other = cache.clone();
+            let mut queue = cache.admit(&requests);
+            prop_assert_eq!(&queue, &other.admit(&anew));
+            for _ in 0..repeats {
+                update_all(&mut cache, &queue);
+                let mut other = cache.clone();
+                prop_assert!(requests.gather_again(&views, &LookUp::default()));
+                let done = cache.repeat(&mut queue);
+                prop_assert_eq!(done, queue.refused == 0);
+                if !done {
+                    queue = cache.admit(&requests);
+                }
+                let expected = other.admit(&anew);
+                prop_assert_eq!(&queue.texels, &expected.texels);
+                prop_assert_eq!((queue.frame(), queue.refused), (expected.frame(), expected.refused));
+                // Nothing in the cache tells them apart later on.
+                let later = Requests::gather(&[View { width, pixels: &scattered(seed + 1, 900) }], &LookUp::default());
+                let [mut a, mut b] = [cache.clone(), other];
+                prop_assert_eq!(a.admit(&later), b.admit(&later));
+            }
+        }
+    }
+
+    /// Everything that happens to a block can be told by the clock.
+    #[test]
+    fn blocks_tell_when_they_changed(seeds in prop::collection::vec(0u32..2, 2..6), few in any::<bool>()) {
+        let mut cache = cache(if few { 40 } else { 100_000 });
+        let (mut before, mut clock) = (cache.clone(), 0);
+        for seed in seeds {
+            let pixels = scattered(seed, 300);
+            let requests = Requests::gather(&[View { width: 64, pixels: &pixels }], &LookUp::default());
+            let mut queue = cache.admit(&requests);
+            let of_block = |cache: &ConeCache<MomentEntry>, block: usize| {
+                let ids: Vec<_> = cache.ids_of_blocks(block..block + 1).collect();
+                let entries: Vec<_> = ids.iter().map(|id| (cache.place(*id), *cache.entry(*id).unwrap())).collect();
+                (ids.first().map(|id| cache.key(*id).unwrap().block), entries)
+            };
+            for step in 0..3 {
+                if step == 1 {
+                    update_all(&mut cache, &queue);
+                } else if step == 2 {
+                    let done = cache.repeat(&mut queue);
+                    prop_assert!(done || few);
+                }
+                for block in 0..cache.end_block() {
+                    let same = of_block(&cache, block) == of_block(&before, block);
+                    prop_assert!(same || cache.changed_at(block) > clock, "block {}, step {}", block, step);
+                    prop_assert!(step < 2 || cache.changed_at(block) <= clock, "nothing was done");
+                }
+                prop_assert!(cache.clock() > clock || step == 2);
+                (before, clock) = (cache.clone(), cache.clock());
+            }
         }
     }
 
