@@ -8,7 +8,7 @@ use dapple_render::area_lights::AreaLightTable;
 use dapple_render::gbuffer::{GBuffer, rasterize};
 use dapple_render::image::{LinearImage, Rgb8Image, ToneMap};
 use dapple_render::shade::shading_points;
-use dapple_render::slc::{Blending, ConeLight, KeptCaps, SlcShading, pixel_places, shade_cones};
+use dapple_render::slc::{Blending, CapTable, ConeLight, KeptCaps, SlcShading, pixel_places, shade_cones};
 use dapple_scene::area_lights::Pick;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{NoFiles, PosedCamera, Scene, ShadingPoint, builtin};
@@ -176,6 +176,7 @@ fn lights_that_move_are_shaded_by_their_shapes() {
             let now = Now { scene: &stage.scene, pose: &pose, tracer: &tracer, environment: None };
             let seen = stage.see(&now);
             lit.step(&stage, &now, Some(&seen));
+            assert!(lit.picture == lit.picture_anew(&stage, &now, &seen), "step {step}");
             if step == 7 {
                 let params = DirectParams { samples: 256, seed: 7, ..DirectParams::default() };
                 quality = stage.quality(&rays(&now, &seen.points, &params), &lit.picture);
@@ -201,6 +202,7 @@ fn things_that_roll_are_no_brighter_than_by_rays() {
         let now = Now { scene: &stage.scene, pose: &pose, tracer: &tracer, environment: None };
         let seen = stage.see(&now);
         lit.step(&stage, &now, Some(&seen));
+        assert!(lit.picture == lit.picture_anew(&stage, &now, &seen), "step {step}");
         if step == steps {
             let params = DirectParams { samples: 64, seed: 7, ..DirectParams::default() };
             let [db, _, bias] = stage.quality(&rays(&now, &seen.points, &params), &lit.picture);
@@ -226,6 +228,9 @@ fn what_changed_out_of_sight_is_learnt_when_it_comes_back() {
         let now = Now { scene: &stage.scene, pose: &pose, tracer: &tracer, environment: None };
         let seen = looks.then(|| stage.see_from(&now, camera));
         there.step(&stage, &now, seen.as_ref());
+        if let (Some(seen), true) = (&seen, i % 50 < 3 || i >= 319) {
+            assert!(there.picture == there.picture_anew(&stage, &now, seen), "step {i}");
+        }
         if i >= 319 {
             fresh.step(&stage, &now, seen.as_ref());
         }
@@ -363,6 +368,17 @@ impl Lit {
             self.picture = shade_cones(&caps, &seen.points, &pixels, &self.shading);
         }
         self.ms.push(start.elapsed().as_secs_f64() * 1e3);
+    }
+}
+
+impl Lit {
+    /// The last picture, with nothing kept from steps before.
+    fn picture_anew(&self, stage: &Stage, now: &Now<'_>, seen: &Seen) -> Vec<Vec3> {
+        let pixels =
+            pixel_places(&stage.scene, now.pose, &seen.camera, &seen.gbuffer, &seen.points, &stage.charting);
+        let table = AreaLightTable::new(&now.lights(now.pose));
+        let light = ConeLight { lights: self.shapes.then_some(&table), ..cone_light(&self.server, &table) };
+        shade_cones(&CapTable::new(&light), &seen.points, &pixels, &self.shading)
     }
 }
 

@@ -376,3 +376,50 @@ fn surroundings_are_light_and_what_moves_before_them_is_noticed() {
     }
     assert_near(mean(&cache), 3.0 * PI, 0.02);
 }
+
+/// The floor turns, stays, is gone and comes back; half of it is looked at, or all, or the same as before.
+#[test]
+fn places_that_follow_are_those_found_anew() {
+    let rig = Rig::new(vec![(sphere(Vec3::ZERO, 0.3, 12, 16), EmitterShape::Sphere, 10.0, over(2.0))]);
+    let mut turned = rig.pose.clone();
+    turned.instances[0].world_from_mesh = Affine3A::from_rotation_x(0.3);
+    let mut gone = rig.pose.clone();
+    gone.instances[0] = PosedInstance::REMOVED;
+    let (still, half) = (&rig.pose, rig.pixels.len() / 2);
+    let frames = [
+        (still, half),
+        (still, half),
+        (still, rig.pixels.len()),
+        (still, half),
+        (&turned, half),
+        (&turned, half),
+        (&turned, half),
+        (&gone, half),
+        (&gone, half),
+        (still, half),
+        (still, rig.pixels.len()),
+    ];
+    let mut cache = rig.cache();
+    let (mut requests, mut queue) = (Requests::default(), UpdateQueue::default());
+    let (mut places, mut before, mut kept) = (EntryPlaces::default(), still, 0);
+    for (number, (now, pixels)) in frames.into_iter().enumerate() {
+        let views = [View { width: SIDE as usize, pixels: &rig.pixels[..pixels] }];
+        let is_same = requests.gather_again(&views, &LookUp { bias: 1.0, blend: false });
+        if !(is_same && cache.repeat(&mut queue)) {
+            queue = cache.admit(&requests);
+        }
+        kept += u32::from(queue.is_repeat());
+        let clock = cache.clock();
+        places.follow(&cache, &queue, &rig.scene, before, now);
+        let anew = EntryPlaces::of(&cache, &queue, &rig.scene, before, now);
+        for (index, texel) in queue.texels.iter().enumerate() {
+            assert_eq!(places.get(index), anew.get(index), "frame {number}");
+            assert_eq!(places.of_entry(texel.id), anew.of_entry(texel.id), "frame {number}");
+        }
+        let has_moved = before.instances[0].world_from_mesh != now.instances[0].world_from_mesh
+            || before.instances[0].is_there() != now.instances[0].is_there();
+        assert_eq!(places.moved_at(0) == clock, has_moved, "frame {number}");
+        before = now;
+    }
+    assert_eq!(kept, 7);
+}
