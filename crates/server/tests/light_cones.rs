@@ -12,7 +12,7 @@ use dapple_render::slc::{Blending, CapTable, ConeLight, KeptCaps, SlcShading, pi
 use dapple_scene::area_lights::Pick;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{NoFiles, PosedCamera, Scene, ShadingPoint, builtin};
-use dapple_server::cones::{ConeServer, Now, cone_charts};
+use dapple_server::cones::{ConeServer, ConeStep, Now, cone_charts};
 use dapple_store::cones::{CacheParams, Charting, EntryId, EntrySite, LookUp, MomentEntry, View, luminance};
 use dapple_trace::Tracer;
 use dapple_trace::direct::{DirectParams, Restir, RestirParams, RestirView, Sequence, trace_direct};
@@ -319,6 +319,7 @@ struct Lit {
     stages: [Vec<f64>; 2],
     /// Of the server's: requests, queue, places, rays.
     passes: [Vec<f64>; 4],
+    counts: ConeStep,
     picture: Vec<Vec3>,
 }
 
@@ -335,6 +336,7 @@ impl Lit {
             server_ms: Vec::new(),
             stages: Default::default(),
             passes: Default::default(),
+            counts: ConeStep::default(),
             picture: Vec::new(),
         }
     }
@@ -352,7 +354,7 @@ impl Lit {
         self.stages[0].push((begun - start).as_secs_f64() * 1e3);
         let mut last = begun;
         let mut passes = self.passes.iter_mut();
-        self.server.step(now, &views, &SlcParams::default(), &mut |_| {
+        self.counts = self.server.step(now, &views, &SlcParams::default(), &mut |_| {
             if let Some(ms) = passes.next() {
                 ms.push(last.elapsed().as_secs_f64() * 1e3);
             }
@@ -388,8 +390,8 @@ fn median(ms: &[f64]) -> f64 {
     sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// Plays a scene to a viewer who stands, methods in turn; prints what the last steps took, and how the last picture is.
-fn play(stage: &Stage, (steps, timed, samples): (u32, u32, u32)) {
+/// Plays a scene to a viewer who stands or walks, methods in turn; prints what the last steps took, and how the last picture is.
+fn play(stage: &Stage, walks: bool, (steps, timed, samples): (u32, u32, u32)) {
     let mut rivals = Rival::all();
     let mut cones = ways();
     let camera = stage.scene.camera_paths()[0].camera(&stage.scene, &stage.scene.pose(stage.time_s));
@@ -398,9 +400,10 @@ fn play(stage: &Stage, (steps, timed, samples): (u32, u32, u32)) {
         let pose = stage.scene.pose(stage.time_s + f64::from(step) / 15.0);
         tracer.update(&stage.scene, &pose);
         let now = Now { scene: &stage.scene, pose: &pose, tracer: &tracer, environment: None };
-        let seen = stage.see_from(&now, camera);
+        let seen = if walks { stage.see(&now) } else { stage.see_from(&now, camera) };
         let is_timed = step + timed >= steps;
-        for rival in &mut rivals {
+        // Reservoirs here are those of a camera that stands still.
+        for rival in rivals.iter_mut().filter(|rival| rival.reservoirs.is_none() || !walks) {
             if is_timed || rival.reservoirs.is_some() {
                 rival.step(&now, stage.size, &seen, u64::from(step));
             }
@@ -413,16 +416,22 @@ fn play(stage: &Stage, (steps, timed, samples): (u32, u32, u32)) {
         }
         let params = DirectParams { samples, seed: 7, ..DirectParams::default() };
         let truth = rays(&now, &seen.points, &params);
-        let last = |ms: &[f64]| median(&ms[ms.len() - timed as usize..]);
+        let last = |ms: &[f64]| median(&ms[ms.len().saturating_sub(timed as usize)..]);
         let line = |name: &str, ms: f64, server_ms: f64, picture: &[Vec3]| {
             let [db, ssim, bias] = stage.quality(&truth, picture);
             println!("| {name} | {ms:.1} | {server_ms:.1} | {db:.2} | {ssim:.4} | {bias:+.2} |");
         };
-        for rival in &rivals {
+        for rival in rivals.iter().filter(|rival| !rival.ms.is_empty()) {
             line(rival.name, last(&rival.ms), last(&rival.ms), &rival.picture);
         }
         for lit in &cones {
             line(lit.name, last(&lit.ms), last(&lit.server_ms), &lit.picture);
+            let [requests, queue, sites, rays] = lit.passes.each_ref().map(|ms| last(ms));
+            let ConeStep { wanted, new, counts, .. } = lit.counts;
+            println!(
+                "  requests {requests:.1}, queue {queue:.1}, places {sites:.1}, rays {rays:.1} ms; {wanted} entries, {new} new, {} updated, {} rays",
+                counts.updated, counts.rays
+            );
         }
     }
 }
@@ -433,6 +442,16 @@ fn play(stage: &Stage, (steps, timed, samples): (u32, u32, u32)) {
 fn lights_that_move() {
     for name in ["street", "hangar"] {
         println!("{name}\n| | ms a step | server's | PSNR | SSIM | bias, % |");
-        play(&Stage::new(name, 0.3, [320, 180]), (40, 5, 256));
+        play(&Stage::new(name, 0.3, [320, 180]), false, (40, 5, 256));
+    }
+}
+
+/// Prints what a step takes while the viewer walks.
+#[test]
+#[ignore = "measures; a minute"]
+fn a_viewer_who_walks() {
+    for name in ["atrium-lamps"] {
+        println!("{name}\n| | ms a step | server's | PSNR | SSIM | bias, % |");
+        play(&Stage::new(name, 0.3, [192, 108]), true, (24, 8, 256));
     }
 }

@@ -21,6 +21,8 @@ struct World {
     points: GeneratedPoints,
     /// Places between the points, where a client looks.
     between: GeneratedPoints,
+    /// Instances that stay where they are at rest.
+    held: Vec<usize>,
 }
 
 impl World {
@@ -40,7 +42,27 @@ impl World {
             at(goal as f32 / few.layout.len().max(1) as f32)
         };
         let (points, between) = (lay(goal, 0), lay(4000, 99));
-        World { scene, points, between }
+        World { scene, points, between, held: Vec::new() }
+    }
+
+    /// The scene in motion, but for what is held.
+    fn pose(&self, time_s: f64) -> Pose {
+        let (mut pose, rest) = (self.scene.pose(time_s), self.scene.pose(0.0));
+        for &instance in &self.held {
+            pose.instances[instance] = rest.instances[instance].clone();
+        }
+        pose
+    }
+
+    /// All lights but one are held.
+    fn with_one_mover(mut self, mover: usize) -> World {
+        let pose = self.scene.pose(0.0);
+        let lights = AreaLights::new(&self.scene, &pose);
+        let held = (0..lights.len()).filter(|light| *light != mover);
+        let held =
+            held.filter_map(|light| lights.instance(light).map(|instance| instance as usize)).collect();
+        self.held = held;
+        self
     }
 }
 
@@ -172,7 +194,7 @@ fn play(
     look: bool,
 ) -> Run {
     let (scene, layout) = (&world.scene, &world.points.layout);
-    let mut pose = scene.pose(start_s);
+    let mut pose = world.pose(start_s);
     let mut tracer = Tracer::new(scene, &pose);
     let lights = TrackerParams { visibility: *params, tolerance: relative };
     let mut tracker = tracker(world, &pose, &tracer, lights);
@@ -190,7 +212,7 @@ fn play(
     });
     let mut looks = 0.0;
     for frame in 1..=(seconds * HZ) as u32 {
-        let now = scene.pose(start_s + f64::from(frame) / HZ);
+        let now = world.pose(start_s + f64::from(frame) / HZ);
         let begun = std::time::Instant::now();
         tracer.update(scene, &now);
         let counts = tracker.step(scene, &now, &tracer, &world.points.anchors, None);
@@ -301,6 +323,13 @@ fn bits_and_errors() {
                 let params = VisibilityParams { rays, first, ..VisibilityParams::default() };
                 line(name, 0.1, &play(&world, 2.0, 3.0, &params, 0.1, true));
             }
+        }
+    }
+    for mover in 0..3 {
+        for goal in [12_000, 30_000, 126_000] {
+            let world = World::new("street", 0.5, goal).with_one_mover(mover);
+            let name = format!("street, light {mover} alone moves");
+            line(&name, 0.1, &play(&world, 2.0, 3.0, &VisibilityParams::default(), 0.1, goal < 100_000));
         }
     }
     let world = World::new("atrium-lamps", 0.5, 12_000);

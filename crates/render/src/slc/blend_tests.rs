@@ -8,6 +8,7 @@ use dapple_store::cones::{
 };
 use dapple_store::light_visibility::SeenLight;
 use glam::{Affine3A, Vec3};
+use proptest::prelude::*;
 
 use super::*;
 use crate::area_lights::{AreaLightTable, shade_area_lights};
@@ -147,4 +148,69 @@ fn settled_entries_show_parts_by_their_cones_and_what_is_narrow_and_whole_by_its
     // Half way.
     let between = shaded_after(64, &rough, [&half; 4], Some(&table));
     assert_near(between, 0.5 * (settled(&rough, &half, None) + shaded(&rough, [&half; 4], Some(&table))));
+}
+
+/// Unit, of any three numbers.
+fn unit(v: [f32; 3]) -> Vec3 {
+    Vec3::from(v).normalize_or(Vec3::Y)
+}
+
+fn any_direction() -> impl Strategy<Value = Vec3> {
+    prop::array::uniform3(-1.0f32..1.0).prop_map(unit)
+}
+
+/// Mirrors and chalk, black and white, seen from anywhere, also from below.
+fn any_point() -> impl Strategy<Value = ShadingPoint> {
+    let part = || prop_oneof![Just(0.0f32), Just(1.0), 0.0f32..1.0];
+    let reflectance = (part(), part(), part(), any::<bool>());
+    let normals = (any_direction(), any_direction(), any_direction());
+    (reflectance, normals, prop_oneof![Just(0.0f32), -1e5f32..1e5]).prop_map(|(of, normals, x)| {
+        let (diffuse, f0, roughness, specular) = of;
+        let (normal_world, leaning, to_viewer_world) = normals;
+        let material = Material {
+            metallic_factor: f0,
+            roughness_factor: roughness,
+            unlit: false,
+            ..matte(Vec3::splat(diffuse))
+        };
+        let stage = Stage::new();
+        let uv = [glam::Vec2::ZERO; 2];
+        let reflectance = Reflectance::of(&stage.scene, &material, &uv, Vec3::splat(diffuse), specular);
+        let lean = if leaning.dot(normal_world) > 0.0 { leaning } else { normal_world };
+        ShadingPoint {
+            instance: 0,
+            position_world: Vec3::new(x, 0.0, 0.0),
+            normal_world,
+            normal_shading_world: lean,
+            to_viewer_world,
+            reflectance,
+            emitted: Vec3::ZERO,
+        }
+    })
+}
+
+/// From hardly any light to all that an entry holds, from points to all around, at the horizon and below it.
+fn any_cone() -> impl Strategy<Value = MomentCone> {
+    let width = prop_oneof![Just(1.0f32), Just(-1.0), -1.0f32..1.0];
+    let cosine = prop_oneof![Just(0.0f32), Just(1.0), 0.0f32..1.0];
+    let rest = (-11.0f32..15.0, 0u32..3, prop_oneof![Just(0.0f32), Just(1.0), 0.0f32..1.0]);
+    (any_direction(), width, cosine, rest).prop_map(|(direction, width, cosine, (power, light, seen))| {
+        let energy = Vec3::new(1.0, 0.5, 0.0) * libm::exp10f(power);
+        let cone = MomentCone::from_cap(direction, width, energy, cosine, LightSet::one(light));
+        MomentCone { seen, ..cone }
+    })
+}
+
+proptest! {
+    #[test]
+    fn no_material_and_no_cone_breaks_a_picture(
+        point in any_point(),
+        cones in prop::array::uniform4(prop::collection::vec(any_cone(), 0..4)),
+        samples in 0u16..300,
+        shapes in any::<bool>(),
+    ) {
+        let table = shapes.then(|| lamp(EmitterShape::Sphere, sphere(4, 6)));
+        let found = shaded_after(samples, &point, cones.each_ref().map(Vec::as_slice), table.as_ref());
+        prop_assert!(found.is_finite() && found.min_element() >= 0.0, "{found}");
+    }
 }

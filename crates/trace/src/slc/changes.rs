@@ -4,6 +4,7 @@ use dapple_scene::area_lights::AreaLights;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Pose, Scene};
 use dapple_store::cones::{MomentEntry, ReAim};
+use rayon::prelude::*;
 
 use super::EntryPlace;
 
@@ -48,24 +49,28 @@ impl<'a> Changes<'a> {
     /// Of a scene from one moment to the next. Nothing changes if both are the same.
     pub fn between(before: &Moment<'a>, now: &Moment<'a>) -> Changes<'a> {
         let lights = now.lights.changed_since(before.lights);
-        let count = now.scene.instances.len();
-        let mut moved = vec![false; count];
-        let mut movers = Vec::new();
-        for (i, moved) in moved.iter_mut().enumerate() {
-            let (Some(then), Some(posed)) = (before.pose.instances.get(i), now.pose.instances.get(i)) else {
-                continue;
-            };
+        let of_instance = |i: usize| {
+            let (then, posed) = (before.pose.instances.get(i)?, now.pose.instances.get(i)?);
             let bent = match (&then.deformed, &posed.deformed) {
                 (None, None) => false,
                 (Some(a), Some(b)) => !std::sync::Arc::ptr_eq(a, b) && a.positions != b.positions,
                 _ => true,
             };
-            *moved = bent || then.world_from_mesh != posed.world_from_mesh;
-            if *moved && now.scene.instances[i].casts {
-                let (then, now) = (ball_about(now.scene, before.pose, i), ball_about(now.scene, now.pose, i));
-                let swept = then.zip(now).map(|(then, now)| join(then, now));
-                movers.extend(swept.or(then).or(now).map(|(center, radius)| (center, radius, i as u32)));
+            if !bent && then.world_from_mesh == posed.world_from_mesh {
+                return None;
             }
+            let [then, now] = [before.pose, now.pose]
+                .map(|pose| now.scene.instances[i].casts.then(|| ball_about(now.scene, pose, i)).flatten());
+            let swept = then.zip(now).map(|(then, now)| join(then, now));
+            Some((i, swept.or(then).or(now)))
+        };
+        let found: Vec<(usize, Option<(Vec3, f32)>)> =
+            (0..now.scene.instances.len()).into_par_iter().filter_map(of_instance).collect();
+        let mut moved = vec![false; now.scene.instances.len()];
+        let mut movers = Vec::new();
+        for (i, ball) in found {
+            moved[i] = true;
+            movers.extend(ball.map(|(center, radius)| (center, radius, i as u32)));
         }
         let nothing = !lights.contains(&true) && !moved.contains(&true);
         Changes { now: now.lights, before: before.lights, lights, moved, movers, nothing, quiet: u32::MAX }
@@ -256,6 +261,12 @@ fn join((a, ra): (Vec3, f32), (b, rb): (Vec3, f32)) -> (Vec3, f32) {
 /// Whether a ball may hide something of a light's ball from a place.
 fn meets(from: Vec3, (light, light_radius): (Vec3, f32), (mover, mover_radius): (Vec3, f32)) -> bool {
     let (to_light, to_mover) = (light - from, mover - from);
+    // Most movers are far from all that lies between.
+    let along = (to_light.dot(to_mover) / to_light.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+    let reach = light_radius + mover_radius;
+    if (to_mover - to_light * along).length_squared() > reach * reach {
+        return false;
+    }
     let (d_light, d_mover) = (to_light.length(), to_mover.length());
     if d_light <= light_radius || d_mover <= mover_radius {
         return true;
