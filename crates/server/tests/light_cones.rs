@@ -104,6 +104,10 @@ fn ways() -> Vec<Lit> {
         Lit::new("slc, all cones", SlcShading { blending: Blending::Cones, ..shading }, true),
         Lit::new("slc, one texel", SlcShading { look_up: near, ..shading }, true),
         Lit::new("slc, bias 2", SlcShading { look_up: wide, ..shading }, true),
+        Lit {
+            params: SlcParams { first_updates: 2, ..SlcParams::default() },
+            ..Lit::new("slc, quick", SlcShading { look_up: wide, ..shading }, true)
+        },
     ]
 }
 
@@ -311,6 +315,7 @@ struct Lit {
     name: &'static str,
     server: ConeServer<MomentEntry>,
     caps: KeptCaps,
+    params: SlcParams,
     shading: SlcShading,
     shapes: bool,
     ms: Vec<f64>,
@@ -330,6 +335,7 @@ impl Lit {
             name,
             server,
             caps: KeptCaps::default(),
+            params: SlcParams::default(),
             shading,
             shapes,
             ms: Vec::new(),
@@ -354,7 +360,7 @@ impl Lit {
         self.stages[0].push((begun - start).as_secs_f64() * 1e3);
         let mut last = begun;
         let mut passes = self.passes.iter_mut();
-        self.counts = self.server.step(now, &views, &SlcParams::default(), &mut |_| {
+        self.counts = self.server.step(now, &views, &self.params, &mut |_| {
             if let Some(ms) = passes.next() {
                 ms.push(last.elapsed().as_secs_f64() * 1e3);
             }
@@ -450,7 +456,7 @@ fn lights_that_move() {
 #[test]
 #[ignore = "measures; a minute"]
 fn a_viewer_who_walks() {
-    for name in ["atrium-lamps"] {
+    for name in ["atrium-lamps", "village"] {
         println!("{name}\n| | ms a step | server's | PSNR | SSIM | bias, % |");
         play(&Stage::new(name, 0.3, [192, 108]), true, (24, 8, 256));
     }

@@ -25,6 +25,8 @@ pub struct Changes<'a> {
     before: &'a AreaLights<'a>,
     /// A light each: moved, or shines differently.
     lights: Vec<bool>,
+    /// A light each: balls that hold it now and, if it changed, did before; its instance. No ball: surroundings, and what is not there.
+    reaches: Vec<(Option<(Vec3, f32)>, Option<u32>)>,
     /// An instance each: moved or bent.
     moved: Vec<bool>,
     /// Balls about what casts and moved, where it was and where it is, with the instance.
@@ -73,7 +75,16 @@ impl<'a> Changes<'a> {
             movers.extend(ball.map(|(center, radius)| (center, radius, i as u32)));
         }
         let nothing = !lights.contains(&true) && !moved.contains(&true);
-        Changes { now: now.lights, before: before.lights, lights, moved, movers, nothing, quiet: u32::MAX }
+        let reach = |(light, changed): (usize, &bool)| {
+            let ball = now.lights.bounds(light).map(|ball| {
+                let then = before.lights.bounds(light).filter(|_| *changed);
+                then.map_or(ball, |then| join(ball, then))
+            });
+            (ball, now.lights.instance(light))
+        };
+        let reaches = lights.iter().enumerate().map(reach).collect();
+        let (now, before) = (now.lights, before.lights);
+        Changes { now, before, lights, reaches, moved, movers, nothing, quiet: u32::MAX }
     }
 
     /// With how many frames before this one nothing had changed in; [`Changes::between`] takes it that nothing ever had. What nobody saw for
@@ -124,41 +135,49 @@ impl<'a> Changes<'a> {
         }
         // Cones hold light by the cosine to the shading normal.
         let (position, normal) = (place.position_world, place.normal_shading_world);
-        let (mut all, mut part, mut new, mut hidden) = (0.0, 0.0, 0.0, false);
-        for light in 0..self.now.len() {
-            let mut energy = self.now.arriving(light, position, normal);
-            let changed = self.lights[light];
-            if changed {
-                energy = energy.max(self.before.arriving(light, position, normal));
+        let arriving = |light: usize| {
+            let energy = self.now.arriving(light, position, normal);
+            if self.lights[light] {
+                energy.max(self.before.arriving(light, position, normal))
+            } else {
+                energy
             }
+        };
+        let (mut part, mut new, mut all, mut hidden) = (0.0, 0.0, 0.0, false);
+        for light in 0..self.now.len() {
+            let (changed, covered) = (self.lights[light], self.covered(light, position, place.normal_world));
+            if !changed && covered <= 0.0 {
+                continue;
+            }
+            let energy = arriving(light);
             if energy <= 0.0 {
                 continue;
             }
-            all += energy;
             if changed && self.before.power_of(light) <= 0.0 {
                 new += energy;
             }
-            let covered = self.covered(light, position, place.normal_world);
             hidden |= covered > 0.0;
             part += energy * if changed { 1.0 } else { covered };
+            all += if changed { energy } else { 0.0 };
         }
-        let of_all = |energy: f32| if all > 0.0 { energy / all } else { 0.0 };
-        Change { share: of_all(part), hidden, new: of_all(new) }
+        // Most entries end here, where few things move among many lights.
+        if part <= 0.0 {
+            return Change::default();
+        }
+        let unchanged = (0..self.now.len()).filter(|light| !self.lights[*light]);
+        all += unchanged.map(arriving).sum::<f32>();
+        Change { share: part / all, hidden, new: new / all }
     }
 
     /// How much of a light something may have moved in front of: all of it, or of the surroundings the part of the view that movers take.
     fn covered(&self, light: usize, position: Vec3, normal: Vec3) -> f32 {
-        let own = self.now.instance(light);
-        let others = self.movers.iter().filter(|mover| Some(mover.2) != own);
-        match self.now.bounds(light) {
-            Some(ball) => {
-                let ball = self
-                    .before
-                    .bounds(light)
-                    .filter(|_| self.lights[light])
-                    .map_or(ball, |before| join(ball, before));
-                f32::from(others.into_iter().any(|mover| meets(position, ball, (mover.0, mover.1))))
-            }
+        if self.movers.is_empty() {
+            return 0.0;
+        }
+        let Some(&(ball, own)) = self.reaches.get(light) else { return 0.0 };
+        let mut others = self.movers.iter().filter(|mover| Some(mover.2) != own);
+        match ball {
+            Some(ball) => f32::from(others.any(|mover| meets(position, ball, (mover.0, mover.1)))),
             None if own.is_some() => 0.0,
             None => others
                 .map(|&(center, radius, _)| {
