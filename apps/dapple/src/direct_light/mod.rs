@@ -75,7 +75,7 @@ pub(crate) enum Technique {
     /// The same with what neighbours and the last frames chose.
     Restir { sampler: Sampler, unbiased: bool },
     /// The paper's cones.
-    PaperCones { params: PaperParams, look_up: LookUp },
+    PaperCones { params: PaperParams, look_up: LookUp, reuse_finer: bool },
     /// Ours.
     Cones(OurCones),
 }
@@ -99,7 +99,8 @@ impl Technique {
     pub(crate) fn paper_cones(sampler: Sampler) -> Technique {
         let (pick, sequence) = sampler.parts();
         let params = PaperParams { pick, sequence, ..PaperParams::default() };
-        Technique::PaperCones { params, look_up: LookUp { bias: 1.0, blend: false } }
+        let look_up = LookUp { bias: 1.0, blend: false };
+        Technique::PaperCones { params, look_up, reuse_finer: false }
     }
 
     pub(crate) fn cones() -> Technique {
@@ -121,6 +122,11 @@ impl Technique {
     /// Our cones, of texels so many pixels wide.
     pub(crate) fn with_texels(self, pixels: f32) -> Technique {
         self.changed(|cones| cones.shading.look_up.bias = pixels)
+    }
+
+    /// Our cones for a quarter of the rays: texels two pixels wide, and entries that are young for two updates.
+    pub(crate) fn quick_cones() -> Technique {
+        Technique::cones().with_texels(2.0).changed(|cones| cones.params.first_updates = 2)
     }
 
     /// Our cones, changed.
@@ -182,8 +188,8 @@ impl Lighter {
                 viewers: Vec::new(),
                 before: None,
             })),
-            Technique::PaperCones { params, look_up } => {
-                let server = ConeServer::new(CacheParams::default(), look_up)?;
+            Technique::PaperCones { params, look_up, reuse_finer } => {
+                let server = ConeServer::new(CacheParams { reuse_finer, ..CacheParams::default() }, look_up)?;
                 Lighter::Paper(Box::new(PaperCones { server, caps: KeptCaps::default(), params, look_up }))
             }
             Technique::Cones(how) => Lighter::Cones(Box::new(Cones {

@@ -25,8 +25,7 @@ pub struct Changes<'a> {
     before: &'a AreaLights<'a>,
     /// A light each: moved, or shines differently.
     lights: Vec<bool>,
-    /// A light each: balls that hold it now and, if it changed, did before; its instance. No ball: surroundings, and what is not there.
-    reaches: Vec<(Option<(Vec3, f32)>, Option<u32>)>,
+    reaches: Vec<Reach>,
     /// An instance each: moved or bent.
     moved: Vec<bool>,
     /// Balls about what casts and moved, where it was and where it is, with the instance.
@@ -34,6 +33,14 @@ pub struct Changes<'a> {
     nothing: bool,
     /// Frames before this in which nothing changed.
     quiet: u32,
+}
+
+/// Where a light is.
+struct Reach {
+    /// Centre and radius of a ball that holds it and, if it changed, held it before; none of surroundings, and of what is not there.
+    ball: Option<(Vec3, f32)>,
+    /// None of surroundings.
+    instance: Option<u32>,
 }
 
 /// What changed for one entry.
@@ -80,7 +87,7 @@ impl<'a> Changes<'a> {
                 let then = before.lights.bounds(light).filter(|_| *changed);
                 then.map_or(ball, |then| join(ball, then))
             });
-            (ball, now.lights.instance(light))
+            Reach { ball, instance: now.lights.instance(light) }
         };
         let reaches = lights.iter().enumerate().map(reach).collect();
         let (now, before) = (now.lights, before.lights);
@@ -174,7 +181,7 @@ impl<'a> Changes<'a> {
         if self.movers.is_empty() {
             return 0.0;
         }
-        let Some(&(ball, own)) = self.reaches.get(light) else { return 0.0 };
+        let Some(&Reach { ball, instance: own }) = self.reaches.get(light) else { return 0.0 };
         let mut others = self.movers.iter().filter(|mover| Some(mover.2) != own);
         match ball {
             Some(ball) => f32::from(others.any(|mover| meets(position, ball, (mover.0, mover.1)))),

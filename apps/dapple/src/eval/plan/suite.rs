@@ -128,6 +128,9 @@ fn study(mut table: toml::Table, folder: &Path, flags: &Options, defaults: &Opti
         // Said for all.
         table.remove("sizes");
     }
+    if let Some(toml::Value::String(path)) = table.get_mut("environment") {
+        *path = below(folder, Path::new(&*path)).to_string_lossy().into_owned();
+    }
     let study = study::read(&kind, &mut table).with_context(|| kind.clone())?;
     if !study.has_scene() {
         if let Some(key) = table.keys().next() {

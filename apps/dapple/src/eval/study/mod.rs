@@ -73,12 +73,17 @@ const KINDS: [(&str, Reader); 16] = [
     ("compensation", |table| own::<compensation::Compensation>(table, &["factors", "samples"])),
     ("hidden-layers", |table| own::<hidden_layers::HiddenLayers>(table, &["plates"])),
     ("multi-view", |table| own::<multi_view::MultiView>(table, &["repeats"])),
-    ("light-methods", |table| own::<light::table::LightMethods>(table, &["steps", "truth-samples"])),
+    ("light-methods", |table| {
+        own::<light::table::LightMethods>(table, &["steps", "truth-samples", "environment"])
+    }),
     ("light-viewers", |table| {
-        own::<light::viewers::LightViewers>(table, &["viewers", "steps", "truth-samples"])
+        own::<light::viewers::LightViewers>(table, &["viewers", "steps", "truth-samples", "environment"])
     }),
     ("light-ablation", |table| {
-        own::<light::ablation::LightAblation>(table, &["updates", "truth-samples", "sizes", "speeds"])
+        own::<light::ablation::LightAblation>(
+            table,
+            &["updates", "truth-samples", "sizes", "speeds", "environment"],
+        )
     }),
     ("pop-in", |table| own::<pop_in::PopIn>(table, &["steps"])),
 ];

@@ -310,6 +310,40 @@ fn direct_light_by_every_method_is_near_the_truth() {
 }
 
 #[test]
+fn direct_light_may_come_from_all_around() {
+    let folder = tempfile::tempdir().unwrap();
+    let sky = folder.path().join("sky.hdr");
+    std::fs::write(
+        &sky,
+        b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n\x80\x80\x80\x82\x80\x80\x80\x82",
+    )
+    .unwrap();
+    // Quoted as a literal, for paths with backslashes.
+    let text = |path: &std::path::Path| {
+        format!(
+            "kind = \"light-methods\"\nsteps = 8\ntruth-samples = 256\nenvironment = '{}'",
+            path.display()
+        )
+    };
+    let found = run_on(&text(&sky), [96, 54], &[], lit_box());
+    let without = run_on("kind = \"light-methods\"\nsteps = 1\ntruth-samples = 16", [96, 54], &[], lit_box());
+    let of = |name: &str, column: usize| {
+        found.tables[0].rows.iter().find(|row| row.name == name).unwrap().values[column].unwrap()
+    };
+    let (rays, psnr, bias) = (2, 4, 6);
+    for name in ["rt-48", "rt-48, best sampler", "slc", "slc by cones alone"] {
+        assert!(
+            of(name, psnr) > 20.0 && of(name, bias).abs() < 4.0,
+            "{name}: {} dB, {} %",
+            of(name, psnr),
+            of(name, bias)
+        );
+    }
+    let boxed = without.tables[0].rows.iter().find(|row| row.name == "rt-48").unwrap().values[rays].unwrap();
+    assert!(of("rt-48", rays) != boxed, "rays go to the surroundings, too");
+}
+
+#[test]
 fn viewers_share_entries_and_all_see_the_truth() {
     let text = "kind = \"light-viewers\"\nviewers = [1, 4]\nsteps = 4\ntruth-samples = 32";
     let found = run_on(text, [48, 27], &[], lit_box());

@@ -181,7 +181,10 @@ impl<E: ConeEntry> ConeCache<E> {
         // One look for the whole block is cheaper than many for each texel.
         let levels = 1..=self.params.reuse_levels as i8;
         let can_reuse = wanted & !known != 0
-            && levels.flat_map(|k| [-k, k]).any(|k| key.relatives(k).any(|block| self.has_samples(&block)));
+            && levels
+                .flat_map(|k| [self.params.reuse_finer.then_some(-k), Some(k)])
+                .flatten()
+                .any(|k| key.relatives(k).any(|block| self.has_samples(&block)));
         if !can_reuse {
             return Vec::new();
         }
@@ -242,7 +245,8 @@ impl<E: ConeEntry> ConeCache<E> {
     /// What a new entry begins with: the entry of the nearest level that has one at its place, finer ones first.
     fn begin_with(&self, key: &TexelKey) -> Option<E> {
         let found = (1..=self.params.reuse_levels).find_map(|steps| {
-            let finer = key.finer(steps).filter_map(|key| self.updated_entry(&key));
+            let finer = self.params.reuse_finer.then(|| key.finer(steps)).into_iter().flatten();
+            let finer = finer.filter_map(|key| self.updated_entry(&key));
             // The first of those with most samples.
             let finer = finer.fold(None, |best: Option<&E>, next| match best {
                 Some(best) if best.confidence() >= next.confidence() => Some(best),

@@ -37,13 +37,15 @@ pub struct CacheParams {
     pub most_bytes: u64,
     /// How many levels away a new entry looks for one to begin with, 0 … 4. Default 2.
     pub reuse_levels: u8,
+    /// Whether that may be a finer one: these go first. Default true; [Stadlbauer2023] sec. 2 knows coarser ones alone.
+    pub reuse_finer: bool,
     /// Most samples that what it begins with counts for, 1 … 4095. Default 16.
     pub reuse_samples: u16,
 }
 
 impl Default for CacheParams {
     fn default() -> Self {
-        CacheParams { most_bytes: 512 << 20, reuse_levels: 2, reuse_samples: 16 }
+        CacheParams { most_bytes: 512 << 20, reuse_levels: 2, reuse_finer: true, reuse_samples: 16 }
     }
 }
 

@@ -272,6 +272,18 @@ fn new_entries_begin_with_those_of_other_levels() {
             assert!((cache.entry(queued.id).unwrap().energy().y - 3.0).abs() < 1e-5);
         }
     }
+    // Only coarser ones.
+    for (pixel_m, reused) in [(0.5, 0), (2.0, 64 * 64)] {
+        let params = CacheParams { reuse_finer: false, ..CacheParams::default() };
+        let mut cache = ConeCache::<MomentEntry>::new(params).unwrap();
+        let side = (80.0 / pixel_m) as usize;
+        let old = floor(side, side, [0.0; 2], pixel_m);
+        let queue = cache.admit(&Requests::gather(&[View { width: side, pixels: &old }], &NEAREST));
+        update_all(&mut cache, &queue);
+        let new = floor(64, 64, [8.0; 2], 1.0);
+        let queue = cache.admit(&Requests::gather(&[View { width: 64, pixels: &new }], &NEAREST));
+        assert_eq!(queue.reused, reused, "{pixel_m}");
+    }
     // Too far away, or not at this place.
     let mut cache = cache(10_000);
     for (pixel_m, origin) in [(8.0, 8.0), (2.0, 200.0)] {

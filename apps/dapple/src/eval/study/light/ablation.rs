@@ -1,9 +1,10 @@
 //! What each part of light cones is worth, how they converge, and what size and speed of lights do to them ([Stadlbauer2023], supplement).
 
+use std::path::PathBuf;
+
 use anyhow::Result;
 use dapple_render::slc::Samples;
 use dapple_scene::Scene;
-use dapple_scene::area_lights::AreaLights;
 use dapple_scene::glam::Vec3;
 use dapple_server::cones::Now;
 use dapple_store::cones::{BoundingParams, LookUp, MomentParams};
@@ -27,12 +28,14 @@ pub(crate) struct LightAblation {
     sizes: Vec<f32>,
     /// Factors on the speed of everything.
     speeds: Vec<f64>,
+    /// Light from all around: an equirectangular Radiance picture.
+    environment: Option<PathBuf>,
 }
 
 impl Default for LightAblation {
     fn default() -> Self {
         let (sizes, speeds) = (vec![0.5, 1.0, 2.0], vec![0.5, 1.0, 2.0, 4.0]);
-        LightAblation { updates: 64, truth_samples: 512, sizes, speeds }
+        LightAblation { updates: 64, truth_samples: 512, sizes, speeds, environment: None }
     }
 }
 
@@ -43,7 +46,7 @@ fn ours(change: impl FnOnce(&mut OurCones)) -> Technique {
 fn papers(change: impl FnOnce(&mut PaperParams, &mut LookUp)) -> Technique {
     let (mut params, mut look_up) = (PaperParams::default(), LookUp { blend: false, ..LookUp::default() });
     change(&mut params, &mut look_up);
-    Technique::PaperCones { params, look_up }
+    Technique::PaperCones { params, look_up, reuse_finer: false }
 }
 
 fn variants() -> Vec<(String, Technique)> {
@@ -66,6 +69,10 @@ fn variants() -> Vec<(String, Technique)> {
     for bias in [1.0, 2.0, 4.0] {
         let look_up = LookUp { bias, blend: false };
         all.push((format!("slc, one texel, bias {bias}"), ours(|c| c.shading.look_up = look_up)));
+    }
+    for updates in [1, 2, 4] {
+        let few = ours(|c| c.params.first_updates = updates);
+        all.push((format!("slc, young for {updates} updates"), few));
     }
     for samples in [1, 4, 8, 16, 64] {
         let fixed = Samples::Fixed(samples);
@@ -162,8 +169,9 @@ impl LightAblation {
             let scene = resized(stage.scene(), factor);
             let pose = scene.pose(time_s);
             let tracer = Tracer::new(&scene, &pose);
-            let now = Now { scene: &scene, pose: &pose, tracer: &tracer, environment: None };
-            let lights = AreaLights::new(&scene, &pose);
+            let now =
+                Now { scene: &scene, pose: &pose, tracer: &tracer, environment: lit.environment.as_ref() };
+            let lights = now.lights(&pose);
             let seen = [Seen::new(&now, stage.camera(time_s), size)?];
             let truth = truth(&now, &lights, &seen[0], self.truth_samples);
             let charting = charts(&scene);
@@ -269,7 +277,7 @@ impl Study for LightAblation {
     }
 
     fn run(&self, subject: &Subject<'_>) -> Result<Findings> {
-        let lit = Lit::new(subject)?;
+        let lit = Lit::new(subject, self.environment.as_deref())?;
         let (still, convergence) = self.still(&lit, subject)?;
         let sizes = self.sizes(&lit)?;
         (subject.progress)(0.85);

@@ -4,19 +4,21 @@ pub(super) mod ablation;
 pub(super) mod table;
 pub(super) mod viewers;
 
+use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Result, bail};
 use dapple_metrics::{PIXELS_PER_DEGREE, flip, psnr, ssim};
 use dapple_render::image::{LinearImage, Rgb8Image, ToneMap};
 use dapple_scene::Pose;
-use dapple_scene::area_lights::{AreaLights, luminance};
+use dapple_scene::area_lights::{AreaLights, Environment, luminance};
 use dapple_scene::glam::Vec3;
 use dapple_server::cones::Now;
 use dapple_store::cones::Charting;
 
 use super::Subject;
 use super::medians::median;
+use crate::direct_light::picture::read_environment;
 use crate::direct_light::{Cost, Lighter, Seen, Technique, charts, warn_of_lights};
 use crate::eval::stage::Stage;
 use crate::picture::luma;
@@ -25,18 +27,20 @@ use crate::picture::luma;
 struct Lit<'a> {
     stage: &'a Stage<'a>,
     charting: Charting,
+    environment: Option<Environment>,
 }
 
 impl<'a> Lit<'a> {
-    fn new(subject: &'a Subject<'_>) -> Result<Lit<'a>> {
+    fn new(subject: &'a Subject<'_>, environment: Option<&Path>) -> Result<Lit<'a>> {
         let stage = subject.stage()?;
         let pose = stage.scene().pose(0.0);
         let lights = AreaLights::new(stage.scene(), &pose);
-        if lights.is_empty() {
+        let environment = environment.map(read_environment).transpose()?;
+        if lights.is_empty() && environment.is_none() {
             bail!("{} has no area light: nothing in it emits", stage.scene().name);
         }
         warn_of_lights(&lights);
-        Ok(Lit { stage, charting: charts(stage.scene()) })
+        Ok(Lit { stage, charting: charts(stage.scene()), environment })
     }
 
     fn size(&self) -> [u32; 2] {
@@ -46,8 +50,9 @@ impl<'a> Lit<'a> {
     /// Calls with the scene at one time.
     fn at<T>(&self, pose: &Pose, call: impl FnOnce(&Now<'_>, &AreaLights<'_>) -> Result<T>) -> Result<T> {
         let tracer = self.stage.tracer_in(pose);
-        let now = Now { scene: self.stage.scene(), pose, tracer: &tracer, environment: None };
-        call(&now, &AreaLights::new(self.stage.scene(), pose))
+        let environment = self.environment.as_ref();
+        let now = Now { scene: self.stage.scene(), pose, tracer: &tracer, environment };
+        call(&now, &now.lights(pose))
     }
 }
 

@@ -1,5 +1,7 @@
 //! Every method for direct light on the same pictures: time and quality ([Stadlbauer2023] Table 1).
 
+use std::path::PathBuf;
+
 use anyhow::Result;
 use serde::Deserialize;
 
@@ -15,11 +17,13 @@ pub(crate) struct LightMethods {
     steps: u32,
     /// Of the truth, a pixel.
     truth_samples: u32,
+    /// Light from all around: an equirectangular Radiance picture.
+    environment: Option<PathBuf>,
 }
 
 impl Default for LightMethods {
     fn default() -> Self {
-        LightMethods { steps: 16, truth_samples: 512 }
+        LightMethods { steps: 16, truth_samples: 2048, environment: None }
     }
 }
 
@@ -44,6 +48,7 @@ fn techniques() -> Vec<(&'static str, Technique)> {
         ("slc by cones alone", Technique::cones().changed(|cones| cones.shapes = false)),
         ("slc, one texel", Technique::cones().without_blending()),
         ("slc, texels twice as wide", Technique::cones().with_texels(2.0)),
+        ("slc-quick", Technique::quick_cones()),
         ("slc", Technique::cones()),
     ]
 }
@@ -87,7 +92,7 @@ impl Study for LightMethods {
     }
 
     fn run(&self, subject: &Subject<'_>) -> Result<Findings> {
-        let lit = Lit::new(subject)?;
+        let lit = Lit::new(subject, self.environment.as_deref())?;
         let stage = lit.stage;
         let size = lit.size();
         let count = stage.frame_times_s.len();

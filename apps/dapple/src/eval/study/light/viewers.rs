@@ -1,5 +1,7 @@
 //! What more viewers cost, in one place, turned apart, in places of their own, and with two eyes ([Stadlbauer2023] figures 11, 13, 14, 16).
 
+use std::path::PathBuf;
+
 use anyhow::Result;
 use dapple_scene::PosedCamera;
 use dapple_scene::glam::{Affine3A, Vec3};
@@ -19,11 +21,13 @@ pub(crate) struct LightViewers {
     steps: u32,
     /// Of the truth, a pixel.
     truth_samples: u32,
+    /// Light from all around: an equirectangular Radiance picture.
+    environment: Option<PathBuf>,
 }
 
 impl Default for LightViewers {
     fn default() -> Self {
-        LightViewers { viewers: vec![1, 2, 4, 8, 16], steps: 9, truth_samples: 64 }
+        LightViewers { viewers: vec![1, 2, 4, 8, 16], steps: 9, truth_samples: 64, environment: None }
     }
 }
 
@@ -95,6 +99,7 @@ fn techniques() -> Vec<(&'static str, Technique)> {
         ("restir-di", Technique::Restir { sampler: Sampler::Power, unbiased: false }),
         ("slc-paper", Technique::paper_cones(Sampler::Power)),
         ("slc, texels twice as wide", Technique::cones().with_texels(2.0)),
+        ("slc-quick", Technique::quick_cones()),
         ("slc", Technique::cones()),
     ]
 }
@@ -174,7 +179,7 @@ impl Study for LightViewers {
     }
 
     fn run(&self, subject: &Subject<'_>) -> Result<Findings> {
-        let lit = Lit::new(subject)?;
+        let lit = Lit::new(subject, self.environment.as_deref())?;
         let size = lit.size();
         let mut findings = Findings::default();
         let total = (Crowd::ALL.len() * self.viewers.len()) as f64;
