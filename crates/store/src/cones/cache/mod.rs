@@ -6,6 +6,8 @@
 
 mod admit;
 mod read;
+#[cfg(test)]
+mod repeat_tests;
 mod requests;
 #[cfg(test)]
 mod tests;
