@@ -118,7 +118,7 @@ impl<E: Update> ConeServer<E> {
         })
     }
 
-    /// Brings what the viewers see up to date. `pass` is called with the name of each stage after it: `requests`, `queue`, `places`, `rays`.
+    /// Brings what the viewers see up to date. `now` is of the same scene in every step: what stays where it was is not looked up again. `pass` is called with the name of each stage after it: `requests`, `queue`, `places`, `rays`.
     pub fn step(
         &mut self,
         now: &Now<'_>,
@@ -128,7 +128,7 @@ impl<E: Update> ConeServer<E> {
     ) -> ConeStep {
         let is_as_before = self.requests.gather_again(views, &self.look_up);
         pass("requests");
-        if !(is_as_before && self.cache.repeat(&mut self.queue)) {
+        if !(is_as_before && self.cache.repeat(&self.requests, &mut self.queue)) {
             self.queue = self.cache.admit(&self.requests);
         }
         pass("queue");

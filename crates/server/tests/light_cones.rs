@@ -105,7 +105,7 @@ fn ways() -> Vec<Lit> {
         Lit::new("slc, one texel", SlcShading { look_up: near, ..shading }, true),
         Lit::new("slc, bias 2", SlcShading { look_up: wide, ..shading }, true),
         Lit {
-            params: SlcParams { first_updates: 2, ..SlcParams::default() },
+            params: SlcParams { first_updates: 1, samples: 2, ..SlcParams::default() },
             ..Lit::new("slc, quick", SlcShading { look_up: wide, ..shading }, true)
         },
     ]

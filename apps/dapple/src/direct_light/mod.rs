@@ -124,9 +124,10 @@ impl Technique {
         self.changed(|cones| cones.shading.look_up.bias = pixels)
     }
 
-    /// Our cones for a quarter of the rays: texels two pixels wide, and entries that are young for two updates.
+    /// Our cones for a quarter of the rays: texels two pixels wide, and entries that are young for one update.
     pub(crate) fn quick_cones() -> Technique {
-        Technique::cones().with_texels(2.0).changed(|cones| cones.params.first_updates = 2)
+        let params = SlcParams { first_updates: 1, samples: 2, ..SlcParams::default() };
+        Technique::cones().with_texels(2.0).changed(|cones| cones.params = params)
     }
 
     /// Our cones, changed.

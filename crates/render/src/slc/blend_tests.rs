@@ -150,6 +150,49 @@ fn settled_entries_show_parts_by_their_cones_and_what_is_narrow_and_whole_by_its
     assert_near(between, 0.5 * (settled(&rough, &half, None) + shaded(&rough, [&half; 4], Some(&table))));
 }
 
+/// Whatever changes, of the entries or of the lights, caps that are kept are those made anew.
+#[test]
+fn caps_that_are_kept_are_as_if_made_anew() {
+    let point = floor(0.5);
+    let place = ChartPlace { chart: 0, uv: [8.0; 2], depth: 0.0, size: [50, 50], texel_m: 1.0 };
+    let pixels = [Some(PixelPlace {
+        instance: 0,
+        triangle: 0,
+        barycentrics: [0.25; 2],
+        place,
+        footprint_m: 1.0,
+        lean: [0.0; 2],
+    })];
+    let mut cache = ConeCache::<MomentEntry>::new(CacheParams::default()).unwrap();
+    let queue = cache.admit(&Requests::gather(&[View { width: 1, pixels: &pixels }], &LookUp::default()));
+    let holds = |energy: f32| MomentEntry::from_parts(&[cone(0.9, energy)], 16, 16);
+    cache
+        .update(&queue, |_, _, entry| {
+            *entry = holds(0.2);
+            true
+        })
+        .unwrap();
+    let [ball, triangles] =
+        [lamp(EmitterShape::Sphere, sphere(8, 12)), lamp(EmitterShape::Triangles, sphere(12, 20))];
+    let site = EntrySite { position_world: Vec3::ZERO, normal_world: Vec3::Y, normal_shading_world: Vec3::Y };
+    let mut kept = KeptCaps::default();
+    let mut seen = Vec::new();
+    for step in 0..8 {
+        if step == 4 {
+            assert!(cache.change(queue.texels[1].id, |entry| *entry = holds(3.0)));
+        }
+        let lights = [None, Some(&ball), Some(&triangles), Some(&ball)][step % 4];
+        let light = ConeLight { cache: &cache, place_of: |_| Some(site), lights };
+        let shade =
+            |table: &CapTable<'_, _>| shade_cones(table, &[Some(point)], &pixels, &SlcShading::default())[0];
+        let [found, anew] = [kept.table(&light, |block| cache.changed_at(block)), CapTable::new(&light)]
+            .map(|table| shade(&table));
+        assert_eq!(found, anew, "step {step}");
+        seen.push(found);
+    }
+    assert!(seen[0] != seen[1] && seen[1] != seen[2] && seen[0] != seen[4], "{seen:?}");
+}
+
 /// Unit, of any three numbers.
 fn unit(v: [f32; 3]) -> Vec3 {
     Vec3::from(v).normalize_or(Vec3::Y)

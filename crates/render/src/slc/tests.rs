@@ -28,6 +28,7 @@ fn floor(diffuse: f32, f0: f32, roughness: f32, specular: bool) -> ShadingPoint 
 }
 
 /// Radiance of one cone of an entry with that normal.
+#[inline(always)]
 fn shade(point: &ShadingPoint, cap: &Cap, normal: Vec3, shading: &SlcShading) -> Vec3 {
     let mut lanes = Lanes::new();
     let mut lens = Lens::of(point, shading, &mut lanes);
@@ -186,4 +187,21 @@ fn gloss_is_by_fluence() {
     let found = shade(&point, &together, Vec3::Y, &ratio(64)).x;
     let sum = apart[0] + apart[1];
     assert!((found / sum - 1.0).abs() < 0.35, "{found}, {sum}");
+}
+
+/// With wide vectors and without, to the bit.
+#[test]
+fn wide_vectors_change_no_number() {
+    for i in 0..40 {
+        let point = floor(0.5, 0.3, 0.05 + 0.02 * i as f32, i % 3 > 0);
+        let direction = Vec3::new(libm::sinf(i as f32), 0.6, libm::cosf(2.0 * i as f32)).normalize();
+        let cap = cap(direction, 0.02 + 0.05 * i as f32, Vec3::Y);
+        let shading = if i % 2 == 0 { SlcShading::default() } else { ratio(16) };
+        let plain = shade(&point, &cap, Vec3::Y, &shading);
+        let wide = vectorized(
+            #[inline(always)]
+            || shade(&point, &cap, Vec3::Y, &shading),
+        );
+        assert_eq!(plain, wide, "{i}");
+    }
 }

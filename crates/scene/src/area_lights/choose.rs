@@ -104,6 +104,25 @@ fn weight_of(sums: &[f32], light: usize) -> f32 {
     }
 }
 
+/// Largest cosine of a unit normal to a direction within a ball at an offset: 1 inside it or without a normal, 0 below the horizon.
+pub fn largest_cosine(normal: Vec3, offset: Vec3, radius: f32) -> f32 {
+    cosine_within(normal, offset, offset.length(), radius)
+}
+
+fn cosine_within(normal: Vec3, offset: Vec3, distance: f32, radius: f32) -> f32 {
+    if normal == Vec3::ZERO || distance <= radius {
+        return 1.0;
+    }
+    let cos_angle = (normal.dot(offset) / distance).clamp(-1.0, 1.0);
+    let sin_spread = radius / distance;
+    let cos_spread = (1.0 - sin_spread * sin_spread).max(0.0).sqrt();
+    if cos_angle >= cos_spread {
+        return 1.0;
+    }
+    // Cosine of the difference of the two angles.
+    (cos_angle * cos_spread + (1.0 - cos_angle * cos_angle).max(0.0).sqrt() * sin_spread).max(0.0)
+}
+
 impl AreaLights<'_> {
     /// Estimate of the irradiance (luminance, W/m²) of a light at a place if nothing stands between: what its ball or plane would
     /// give, with cosines at the most that its extent allows. Greater than 0 wherever any of it can arrive.
@@ -122,20 +141,7 @@ impl AreaLights<'_> {
             return 0.0;
         }
         let distance = distance2.sqrt();
-        // Largest cosine of the surface's normal to a direction within the ball; 1 inside it, 0 below the horizon.
-        let cosine = |normal: Vec3, to: Vec3| {
-            if normal == Vec3::ZERO || distance <= radius {
-                return 1.0;
-            }
-            let cos_angle = (normal.dot(to) / distance).clamp(-1.0, 1.0);
-            let sin_spread = radius / distance;
-            let cos_spread = (1.0 - sin_spread * sin_spread).max(0.0).sqrt();
-            if cos_angle >= cos_spread {
-                return 1.0;
-            }
-            // Cosine of the difference of the two angles.
-            (cos_angle * cos_spread + (1.0 - cos_angle * cos_angle).max(0.0).sqrt() * sin_spread).max(0.0)
-        };
+        let cosine = |normal: Vec3, to: Vec3| cosine_within(normal, to, distance, radius);
         let on_surface = cosine(normal_world, offset);
         if on_surface <= 0.0 {
             return 0.0;

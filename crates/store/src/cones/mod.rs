@@ -20,7 +20,7 @@ pub use bounding::{
 };
 pub use cache::{
     CacheCounts, CacheParams, ConeCache, EntryId, EntrySite, LookUp, PixelPlace, QueuedTexel, Reader, Reads,
-    Requests, TexelPlace, UpdateQueue, View,
+    Requests, TexelPlace, Touch, UpdateQueue, View,
 };
 pub use charting::{ChartPlace, Charting};
 pub use entry::{ConeEntry, ConeError, ConeSample, MOST_ENERGY, luminance};

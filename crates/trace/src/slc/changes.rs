@@ -1,8 +1,10 @@
 //! What changed between two moments, and for how much of an entry's light: a server knows its movers.
 
-use dapple_scene::area_lights::AreaLights;
+use std::sync::Arc;
+
+use dapple_scene::area_lights::{AreaLights, largest_cosine};
 use dapple_scene::glam::Vec3;
-use dapple_scene::{Pose, Scene};
+use dapple_scene::{Pose, PosedInstance, Scene};
 use dapple_store::cones::{MomentEntry, ReAim};
 use rayon::prelude::*;
 
@@ -43,6 +45,16 @@ struct Reach {
     instance: Option<u32>,
 }
 
+/// Whether an instance is where it was, and not bent otherwise.
+pub(super) fn is_still(then: &PosedInstance, now: &PosedInstance) -> bool {
+    let as_before = match (&then.deformed, &now.deformed) {
+        (None, None) => true,
+        (Some(a), Some(b)) => Arc::ptr_eq(a, b) || a.positions == b.positions,
+        _ => false,
+    };
+    as_before && then.world_from_mesh == now.world_from_mesh
+}
+
 /// What changed for one entry.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Change {
@@ -60,12 +72,7 @@ impl<'a> Changes<'a> {
         let lights = now.lights.changed_since(before.lights);
         let of_instance = |i: usize| {
             let (then, posed) = (before.pose.instances.get(i)?, now.pose.instances.get(i)?);
-            let bent = match (&then.deformed, &posed.deformed) {
-                (None, None) => false,
-                (Some(a), Some(b)) => !std::sync::Arc::ptr_eq(a, b) && a.positions != b.positions,
-                _ => true,
-            };
-            if !bent && then.world_from_mesh == posed.world_from_mesh {
+            if is_still(then, posed) {
                 return None;
             }
             let [then, now] = [before.pose, now.pose]
@@ -173,7 +180,8 @@ impl<'a> Changes<'a> {
         }
         let unchanged = (0..self.now.len()).filter(|light| !self.lights[*light]);
         all += unchanged.map(arriving).sum::<f32>();
-        Change { share: part / all, hidden, new: new / all }
+        // Sums in another order may differ in the last bit.
+        Change { share: f32::min(part / all, 1.0), hidden, new: f32::min(new / all, 1.0) }
     }
 
     /// How much of a light something may have moved in front of: all of it, or of the surroundings the part of the view that movers take.
@@ -221,6 +229,9 @@ impl Change {
             let fluence_after = if gone { 0.0 } else { fluence(changes.now, place.position_world) };
             let before = fluence_before * mean_cosine(place.normal_shading_before_world, a, then.1);
             let after = fluence_after * mean_cosine(place.normal_shading_world, b, now.1);
+            // What a cone has of fluence came from above the horizon.
+            let fluence_before = fluence_before * part_above(place.normal_shading_before_world, a, then.1);
+            let fluence_after = fluence_after * part_above(place.normal_shading_world, b, now.1);
             if before <= 0.0 || then.1 <= 0.0 {
                 continue;
             }
@@ -231,7 +242,7 @@ impl Change {
                 to,
                 energy_ratio: after / before,
                 fluence_ratio: fluence_after / fluence_before,
-                most_cosine: most_cosine(place.normal_shading_world, b, now.1),
+                most_cosine: largest_cosine(place.normal_shading_world, b, now.1),
                 size_ratio,
             });
         }
@@ -253,13 +264,9 @@ fn mean_cosine(normal: Vec3, offset: Vec3, radius: f32) -> f32 {
     above * above / (4.0 * sine.max(f32::MIN_POSITIVE))
 }
 
-/// Largest cosine to a normal of light from a ball at an offset, or a little more.
-fn most_cosine(normal: Vec3, offset: Vec3, radius: f32) -> f32 {
-    let distance = offset.length();
-    if distance <= radius {
-        return 1.0;
-    }
-    ((normal.dot(offset) + radius) / distance).clamp(0.0, 1.0)
+/// Part of a ball at an offset that is above the horizon, by its height; what is less than a tenth counts as that, since ratios of it say nothing.
+fn part_above(normal: Vec3, offset: Vec3, radius: f32) -> f32 {
+    (0.5 + 0.5 * normal.dot(offset) / radius.max(f32::MIN_POSITIVE)).clamp(0.1, 1.0)
 }
 
 /// A ball that holds an instance: about the middle of its box, and just large enough for its vertices, since all entries whose light it may meet take rays
@@ -285,7 +292,11 @@ fn join((a, ra): (Vec3, f32), (b, rb): (Vec3, f32)) -> (Vec3, f32) {
 }
 
 /// Whether a ball may hide something of a light's ball from a place.
-fn meets(from: Vec3, (light, light_radius): (Vec3, f32), (mover, mover_radius): (Vec3, f32)) -> bool {
+pub(super) fn meets(
+    from: Vec3,
+    (light, light_radius): (Vec3, f32),
+    (mover, mover_radius): (Vec3, f32),
+) -> bool {
     let (to_light, to_mover) = (light - from, mover - from);
     // Most movers are far from all that lies between.
     let along = (to_light.dot(to_mover) / to_light.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);

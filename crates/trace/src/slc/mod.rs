@@ -20,7 +20,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use dapple_scene::area_lights::{AreaLights, Chooser, Pick};
 use dapple_scene::glam::Vec3;
 use dapple_store::cones::{
-    BLOCK_SIDE, ConeCache, ConeEntry, ConeSample, EntryId, HiddenSample, MomentEntry, MomentParams,
+    BLOCK_SIDE, ConeCache, ConeEntry, ConeSample, EntryId, HiddenSample, MomentEntry, MomentParams, Touch,
     UpdateQueue, luminance,
 };
 
@@ -42,11 +42,15 @@ pub const MAX_SAMPLES: u32 = 256;
 pub struct SlcParams {
     /// How samples become cones.
     pub moment: MomentParams,
-    /// Samples of an update while an entry is young, 1 … [`MAX_SAMPLES`], default 8 ([Stadlbauer2023] sec. 4).
+    /// Samples of an update while an entry is young, 1 … [`MAX_SAMPLES`], default 16: rays from one place together are quicker than apart. The 8 of
+    /// [Stadlbauer2023] sec. 4 are the paper's own entries'.
     pub first_samples: u32,
-    /// Updates with that many, default 8 ([Stadlbauer2023] sec. 4).
+    /// Updates with that many, default 2.
     pub first_updates: u32,
-    /// Samples a frame after that, while nothing changes, default 1 ([Stadlbauer2023] sec. 4), taken several at a time. None are taken once an entry
+    /// Most samples of an update of an entry some of whose light changed: all of them if all did, and not less than that times the root of the part that
+    /// did. 0 … [`MAX_SAMPLES`], default 8.
+    pub changed_samples: u32,
+    /// Samples a frame after that, while nothing changes, default 3, taken several at a time. None are taken once an entry
     /// stands for [`MomentParams::max_samples`]: where nothing changes it is as good as it gets. 0: none.
     pub samples: u32,
     /// How lights are picked, default by fluence.
@@ -63,9 +67,10 @@ impl Default for SlcParams {
     fn default() -> Self {
         SlcParams {
             moment: MomentParams::default(),
-            first_samples: 8,
-            first_updates: 8,
-            samples: 1,
+            first_samples: 16,
+            first_updates: 2,
+            changed_samples: 8,
+            samples: 3,
             pick: Pick::Fluence,
             sequence: Sequence::Lattice,
             re_aim: true,
@@ -128,16 +133,19 @@ impl Update for MomentEntry {
         let source = Source { pick, sequence, seed, with_cosine: true };
         let frame = cache.frame();
         let updated = cache.update(queue, |index, texel, entry| {
-            let (Some(place), false) = (places.get(index), lights.is_empty()) else { return false };
+            let (Some(place), false) = (places.get(index), lights.is_empty()) else { return Touch::Nothing };
+            let mut touch = Touch::Nothing;
             let change = changes.of(place, texel.instance);
             let site = site_of(texel.instance, texel.place.triangle, texel.place.barycentrics);
             if texel.moved {
                 // What it knows is of a place beside it.
                 ConeEntry::cut_confidence(entry, KEPT as u16);
+                touch = Touch::Changed;
             }
             if let Some(kept) = (KEPT as u32).checked_div(changes.missed(texel.absent)) {
                 // What it knows may be of another time.
                 ConeEntry::cut_confidence(entry, kept as u16);
+                touch = Touch::Changed;
             }
             let turn = turn_of(texel.id);
             // When it is its turn in any case.
@@ -145,6 +153,7 @@ impl Update for MomentEntry {
             let mut count = quiet_samples(entry, params, phase);
             if change.share > LEAST_SHARE {
                 changed.fetch_add(1, Ordering::Relaxed);
+                touch = Touch::Changed;
                 let root = change.share.sqrt();
                 if params.re_aim {
                     change.re_aim(entry, place, changes);
@@ -155,20 +164,21 @@ impl Update for MomentEntry {
                 entry.cut_confidence(kept.clamp(1.0, 4095.0) as u16);
                 let follows = params.re_aim && change.new <= LEAST_SHARE && !texel.moved && !texel.is_new;
                 if follows && is_plain(entry) && !turn.wrapping_add(frame).is_multiple_of(2) {
-                    return false;
+                    return touch;
                 }
-                count = count.max(libm::ceilf(params.first_samples as f32 * root) as u32);
+                let most = params.changed_samples;
+                count = count.min(most).max(libm::ceilf(most as f32 * root) as u32);
             }
             let count = count.min(MAX_SAMPLES);
             if count == 0 {
-                return false;
+                return touch;
             }
             let indices = (0..count).map(|i| entry.taken().wrapping_add(i));
             let drawn = take_samples(tracer, lights, place, &source, site, indices);
             rays.fetch_add(drawn.rays, Ordering::Relaxed);
             let picked = |light| drawn.chooser.probability(lights, light as usize);
             entry.update_seen(&drawn.samples, &drawn.hidden, count, picked, &params.moment);
-            true
+            Touch::Updated
         });
         // A queue of another frame is the caller's mistake, and updates nothing.
         let updated = updated.unwrap_or(0);

@@ -5,6 +5,8 @@ use dapple_scene::{Pose, Scene};
 use dapple_store::cones::{BACK, ConeCache, ConeEntry, EntryId, TexelPlace, UpdateQueue};
 use rayon::prelude::*;
 
+use super::changes::is_still;
+
 /// A place on a surface, this moment and the last.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EntryPlace {
@@ -48,7 +50,7 @@ impl EntryPlaces {
         places
     }
 
-    /// Turns the places of the frame before, found in the pose `before` of the same scene, into what [`EntryPlaces::of`] would give: what stayed where it
+    /// Turns the places of the frame before, found in the pose `before` of the same scene for the same cache, into what [`EntryPlaces::of`] would give: what stayed where it
     /// was is not looked up again.
     pub fn follow<E: ConeEntry>(
         &mut self,
@@ -59,14 +61,7 @@ impl EntryPlaces {
         now: &Pose,
     ) {
         let still: Vec<bool> = (0..now.instances.len())
-            .map(|i| match (before.instances.get(i), &now.instances[i]) {
-                (Some(then), now) => {
-                    then.world_from_mesh == now.world_from_mesh
-                        && then.is_there() == now.is_there()
-                        && (then.deformed.is_none() && now.deformed.is_none())
-                }
-                (None, _) => false,
-            })
+            .map(|i| before.instances.get(i).is_some_and(|then| is_still(then, &now.instances[i])))
             .collect();
         self.moved_at.resize(still.len(), 0);
         for (at, still) in self.moved_at.iter_mut().zip(&still) {
@@ -81,11 +76,11 @@ impl EntryPlaces {
             return;
         }
         self.all_still = all_still;
-        let is_still = |instance: u32| still.get(instance as usize) == Some(&true);
+        let stands = |instance: u32| still.get(instance as usize) == Some(&true);
         let place = |texel: &dapple_store::cones::QueuedTexel| {
             let stayed = follows && !texel.is_new && !texel.moved && texel.absent == 0;
             if stayed
-                && is_still(texel.instance)
+                && stands(texel.instance)
                 && let Some(index) = self.of_entry.get(texel.id.index())
                 && let Some(held) = self.places.get(*index as usize)
             {
@@ -103,7 +98,7 @@ impl EntryPlaces {
                 return EntryPlace::default();
             };
             // Between two equal poses nothing is to be found out.
-            let then = if is_still(texel.instance) { None } else { at(before) };
+            let then = if stands(texel.instance) { None } else { at(before) };
             let [position_before_world, _, normal_shading_before_world] =
                 then.unwrap_or([position_world, normal_world, normal_shading_world]);
             EntryPlace {

@@ -12,6 +12,8 @@ use dapple_store::cones::{
     UpdateQueue, View,
 };
 
+use proptest::prelude::*;
+
 use super::*;
 use crate::test_support::{disc, quad, scene as placed, sphere};
 
@@ -295,7 +297,7 @@ fn cones_follow_a_light_that_moves() {
     }
     // Every other of 30 steps was every entry's turn.
     for (id, settled) in cache.ids().zip(settled) {
-        assert_eq!(cache.entry(id).unwrap().taken() - settled, 15 * params.first_samples);
+        assert_eq!(cache.entry(id).unwrap().taken() - settled, 15 * params.changed_samples);
     }
 }
 
@@ -405,7 +407,7 @@ fn places_that_follow_are_those_found_anew() {
     for (number, (now, pixels)) in frames.into_iter().enumerate() {
         let views = [View { width: SIDE as usize, pixels: &rig.pixels[..pixels] }];
         let is_same = requests.gather_again(&views, &LookUp { bias: 1.0, blend: false });
-        if !(is_same && cache.repeat(&mut queue)) {
+        if !(is_same && cache.repeat(&requests, &mut queue)) {
             queue = cache.admit(&requests);
         }
         kept += u32::from(queue.is_repeat());
@@ -422,4 +424,46 @@ fn places_that_follow_are_those_found_anew() {
         before = now;
     }
     assert_eq!(kept, 7);
+}
+
+proptest! {
+    /// No shadow is missed: what a line of sight into a light's ball meets, may hide something of it.
+    #[test]
+    fn what_is_in_the_way_is_told(
+        centers in prop::array::uniform6(-4.0f32..4.0),
+        at in prop::array::uniform3(-1.0f32..1.0),
+        radii in prop::array::uniform2(0.01f32..2.0),
+        along in 0.0f32..1.0,
+        off in prop::array::uniform3(-1.0f32..1.0),
+    ) {
+        let [from, light] = [0, 3].map(|i| Vec3::new(centers[i], centers[i + 1], centers[i + 2]));
+        let [light_radius, mover_radius] = radii;
+        let aim = light + Vec3::from(at).clamp_length_max(1.0) * light_radius;
+        // A ball that a place on the line is in.
+        let mover = from.lerp(aim, along) + Vec3::from(off).clamp_length_max(1.0) * (0.999 * mover_radius);
+        prop_assert!(changes::meets(from, (light, light_radius), (mover, mover_radius)));
+    }
+}
+
+/// A lamp comes up from behind the horizon of a floor that turns: what was half seen is seen whole, and has twice the fluence.
+#[test]
+fn light_that_rises_over_a_horizon_is_all_there() {
+    let mut rig = Rig::new(vec![(sphere(Vec3::ZERO, 0.5, 16, 24), EmitterShape::Sphere, 10.0, over(2.0))]);
+    // The floor stands on its edge, the lamp half behind its plane.
+    let edge = Affine3A::from_rotation_x(-std::f32::consts::FRAC_PI_2);
+    rig.pose.instances[0].world_from_mesh = edge;
+    let params = SlcParams { samples: 8, ..SlcParams::default() };
+    let cache = rig.settled(40, &params);
+    let mut now = rig.pose.clone();
+    now.instances[0].world_from_mesh = Affine3A::from_rotation_x(-0.9);
+    // Followed, without a sample.
+    let blind = SlcParams { first_samples: 1, first_updates: 1, changed_samples: 0, samples: 0, ..params };
+    let mut followed = cache.clone();
+    rig.step(&mut followed, &rig.pose, &now, &blind);
+    let mut fresh = rig.cache();
+    for _ in 0..30 {
+        rig.step(&mut fresh, &now, &now, &params);
+    }
+    let (before, found, exact) = (mean(&cache), mean(&followed), mean(&fresh));
+    assert!(before < 0.2 * exact && (found / exact - 1.0).abs() < 0.25, "{before}, {found}, {exact}");
 }

@@ -129,7 +129,11 @@ fn study(mut table: toml::Table, folder: &Path, flags: &Options, defaults: &Opti
         table.remove("sizes");
     }
     if let Some(toml::Value::String(path)) = table.get_mut("environment") {
-        *path = below(folder, Path::new(&*path)).to_string_lossy().into_owned();
+        let at = below(folder, Path::new(&*path));
+        if !at.is_file() {
+            bail!("{kind}: there is no environment {}", at.display());
+        }
+        *path = at.to_string_lossy().into_owned();
     }
     let study = study::read(&kind, &mut table).with_context(|| kind.clone())?;
     if !study.has_scene() {

@@ -106,15 +106,17 @@ impl<E: ConeEntry> ConeCache<E> {
             }
         }
         queue.releases = self.releases;
+        self.admitted = requests.name;
         queue
     }
 
-    /// Begins a frame with what the last one had: the same as [`ConeCache::admit`] with the same requests, in next to no time. `queue` is the last
-    /// frame's and becomes this one's. `false`, and nothing is done, if it is not the last, if blocks were removed since, or if something was refused,
-    /// for which there may be room now.
+    /// Begins a frame with what the last one had: the same as [`ConeCache::admit`] with these requests, in next to no time. `queue` is the last
+    /// frame's and becomes this one's. `false`, and nothing is done, if the last frame's requests were others, if the queue is not its, if blocks were
+    /// removed since, or if something was refused, for which there may be room now.
     #[must_use]
-    pub fn repeat(&mut self, queue: &mut UpdateQueue) -> bool {
-        if queue.frame != self.frame || queue.releases != self.releases || queue.refused > 0 {
+    pub fn repeat(&mut self, requests: &Requests, queue: &mut UpdateQueue) -> bool {
+        let is_last = queue.frame == self.frame && requests.name == self.admitted && requests.name != 0;
+        if !is_last || queue.releases != self.releases || queue.refused > 0 {
             return false;
         }
         self.begin_frame();

@@ -101,6 +101,23 @@ impl EntryId {
     }
 }
 
+/// What an update did to an entry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Touch {
+    /// It is as it was.
+    Nothing,
+    /// It is not, but took no samples.
+    Changed,
+    /// It took samples: others may begin with it.
+    Updated,
+}
+
+impl From<bool> for Touch {
+    fn from(updated: bool) -> Touch {
+        if updated { Touch::Updated } else { Touch::Nothing }
+    }
+}
+
 /// What is looked at often of a block.
 #[derive(Clone, Copy, Debug)]
 struct Head {
@@ -177,6 +194,8 @@ pub struct ConeCache<E> {
     clock: u64,
     /// Blocks that were ever removed.
     releases: u64,
+    /// Names the requests of this frame; 0 if there were none.
+    admitted: u64,
 }
 
 impl<E: ConeEntry> ConeCache<E> {
@@ -196,6 +215,7 @@ impl<E: ConeEntry> ConeCache<E> {
             frame: 0,
             clock: 0,
             releases: 0,
+            admitted: 0,
         })
     }
 
@@ -217,7 +237,7 @@ impl<E: ConeEntry> ConeCache<E> {
         CacheCounts { blocks, entries, bytes: self.heads.len() as u64 * Self::block_bytes() }
     }
 
-    /// Number of the frame: how often something was admitted.
+    /// Number of the frame: how often something was admitted or repeated.
     pub fn frame(&self) -> u32 {
         self.frame
     }
@@ -241,14 +261,15 @@ impl<E: ConeEntry> ConeCache<E> {
     }
 
     /// Updates entries of this frame's queue in parallel, in the caller's thread pool: `update` gets the index in the queue, what
-    /// stands there, and the entry, and says whether it did anything. Returns how many entries it did.
+    /// stands there, and the entry, and says what it did (`true`: [`Touch::Updated`], `false`: nothing). Returns how many entries it updated.
     ///
     /// # Errors
     ///
     /// The queue is of another frame.
-    pub fn update<F>(&mut self, queue: &UpdateQueue, update: F) -> Result<u64, ConeError>
+    pub fn update<F, T>(&mut self, queue: &UpdateQueue, update: F) -> Result<u64, ConeError>
     where
-        F: Fn(usize, &QueuedTexel, &mut E) -> bool + Sync,
+        F: Fn(usize, &QueuedTexel, &mut E) -> T + Sync,
+        T: Into<Touch>,
     {
         if queue.frame != self.frame {
             let (name, rule) = ("frame of the queue", "it must be the cache's last one");
@@ -257,16 +278,20 @@ impl<E: ConeEntry> ConeCache<E> {
         self.clock += 1;
         let clock = self.clock;
         let done = self.heads.par_iter_mut().zip(&mut self.bodies).map(|(head, body)| {
-            let mut done = 0;
+            let (mut done, mut touched) = (0, false);
             for (index, texel) in (head.first_queued as usize..).zip(bits(head.wanted)) {
                 let Some(queued) = queue.texels.get(index) else { break };
-                if update(index, queued, &mut body.entries[texel]) {
+                let touch = update(index, queued, &mut body.entries[texel]).into();
+                if touch == Touch::Updated {
                     head.own |= 1 << texel;
-                    head.note_samples(texel, &body.entries[texel]);
                     done += 1;
                 }
+                if touch != Touch::Nothing {
+                    head.note_samples(texel, &body.entries[texel]);
+                    touched = true;
+                }
             }
-            if done > 0 {
+            if touched {
                 head.changed = clock;
             }
             done

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::super::MomentEntry;
+use super::super::{MomentEntry, MomentParams};
 use super::tests::{cache, scattered, update_all};
 use super::*;
 
@@ -28,7 +28,7 @@ proptest! {
                 update_all(&mut cache, &queue);
                 let mut other = cache.clone();
                 prop_assert!(requests.gather_again(&views, &LookUp::default()));
-                let done = cache.repeat(&mut queue);
+                let done = cache.repeat(&requests, &mut queue);
                 prop_assert_eq!(done, queue.refused == 0);
                 if !done {
                     queue = cache.admit(&requests);
@@ -46,33 +46,84 @@ proptest! {
 
     /// Everything that happens to a block can be told by the clock.
     #[test]
-    fn blocks_tell_when_they_changed(seeds in prop::collection::vec(0u32..2, 2..6), few in any::<bool>()) {
+    fn blocks_tell_when_they_changed(steps in prop::collection::vec((0u32..2, 0u32..7), 2..12), few in any::<bool>()) {
         let mut cache = cache(if few { 40 } else { 100_000 });
-        let (mut before, mut clock) = (cache.clone(), 0);
-        for seed in seeds {
-            let pixels = scattered(seed, 300);
-            let requests = Requests::gather(&[View { width: 64, pixels: &pixels }], &LookUp::default());
-            let mut queue = cache.admit(&requests);
-            let of_block = |cache: &ConeCache<MomentEntry>, block: usize| {
-                let ids: Vec<_> = cache.ids_of_blocks(block..block + 1).collect();
-                let entries: Vec<_> = ids.iter().map(|id| (cache.place(*id), *cache.entry(*id).unwrap())).collect();
-                (ids.first().map(|id| cache.key(*id).unwrap().block), entries)
-            };
-            for step in 0..3 {
-                if step == 1 {
-                    update_all(&mut cache, &queue);
-                } else if step == 2 {
-                    let done = cache.repeat(&mut queue);
-                    prop_assert!(done || few);
+        let mut queue = UpdateQueue::default();
+        let mut requests = Requests::default();
+        let of_block = |cache: &ConeCache<MomentEntry>, queue: &UpdateQueue, block: usize| {
+            let ids: Vec<_> = cache.ids_of_blocks(block..block + 1).collect();
+            let entries: Vec<_> = ids.iter().map(|id| (cache.place(*id), *cache.entry(*id).unwrap())).collect();
+            let wanted: Vec<_> =
+                queue.texels.iter().map(|t| t.id).filter(|id| id.index() / BLOCK_TEXELS == block && cache.key(*id).is_some()).collect();
+            (ids.first().map(|id| cache.key(*id).unwrap().block), entries, wanted)
+        };
+        for (seed, what) in steps {
+            let (before, queue_before, clock) = (cache.clone(), queue.clone(), cache.clock());
+            let mut is_idle = false;
+            match what {
+                0 | 1 => {
+                    let pixels = scattered(seed, 300);
+                    requests = Requests::gather(&[View { width: 64, pixels: &pixels }], &LookUp::default());
+                    queue = cache.admit(&requests);
                 }
-                for block in 0..cache.end_block() {
-                    let same = of_block(&cache, block) == of_block(&before, block);
-                    prop_assert!(same || cache.changed_at(block) > clock, "block {}, step {}", block, step);
-                    prop_assert!(step < 2 || cache.changed_at(block) <= clock, "nothing was done");
+                2 => is_idle = cache.repeat(&requests, &mut queue),
+                3 => {
+                    let update = |_: usize, _: &QueuedTexel, entry: &mut MomentEntry| {
+                        entry.update(&[], 3, &MomentParams::default());
+                        true
+                    };
+                    prop_assert!(cache.update(&queue, update).is_ok());
                 }
-                prop_assert!(cache.clock() > clock || step == 2);
-                (before, clock) = (cache.clone(), cache.clock());
+                4 => {
+                    // Few take samples, some change without.
+                    let done = cache.update(&queue, |i, _, entry: &mut MomentEntry| match i % 50 {
+                        0 => {
+                            entry.cut_confidence(1);
+                            Touch::Changed
+                        }
+                        _ => Touch::Nothing,
+                    });
+                    prop_assert!(queue.frame() == 0 || done == Ok(0));
+                }
+                5 => {
+                    if let Some(texel) = queue.texels.first() {
+                        cache.change(texel.id, |entry| entry.cut_confidence(2));
+                    }
+                }
+                _ => cache.retain_instances(|instance| instance != 1),
+            }
+            for block in 0..cache.end_block() {
+                let same = of_block(&cache, &queue, block) == of_block(&before, &queue_before, block);
+                prop_assert!(same || cache.changed_at(block) > clock, "block {}, by {}", block, what);
+                prop_assert!(!is_idle || cache.changed_at(block) <= clock, "nothing was done");
             }
         }
     }
+}
+
+#[test]
+fn only_the_same_is_repeated() {
+    let mut cache = cache(100_000);
+    let [first, second] = [1, 2].map(|seed| {
+        let pixels = scattered(seed, 500);
+        Requests::gather(&[View { width: 64, pixels: &pixels }], &LookUp::default())
+    });
+    let mut queue = cache.admit(&first);
+    let old = queue.clone();
+    assert!(!cache.repeat(&second, &mut queue), "other requests");
+    assert!(!cache.repeat(&Requests::default(), &mut queue), "none");
+    assert!(cache.repeat(&first, &mut queue) && cache.repeat(&first, &mut queue));
+    assert!(!cache.repeat(&first, &mut old.clone()), "an old queue");
+    cache.retain_instances(|instance| instance != 0);
+    let frame = cache.frame();
+    assert!(!cache.repeat(&first, &mut queue), "an instance is gone");
+    assert_eq!(cache.frame(), frame);
+    // Gathered again and not admitted: what is in the cache is of other pixels.
+    let pixels = scattered(3, 500);
+    let views = [View { width: 64, pixels: &pixels }];
+    let mut requests = first.clone();
+    let mut queue = cache.admit(&requests);
+    assert!(!requests.gather_again(&views, &LookUp::default()));
+    assert!(requests.gather_again(&views, &LookUp::default()));
+    assert!(!cache.repeat(&requests, &mut queue), "never admitted");
 }

@@ -1,6 +1,7 @@
 //! Stage 1: which texels all viewers together want, and the place each stands for ([Stadlbauer2023] sec. 2.1, *visibility*).
 
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
@@ -141,7 +142,12 @@ pub struct Requests {
     pub(super) tiles: Vec<TileRequests>,
     /// What they were gathered with.
     look_up: Option<LookUp>,
+    /// No others have it; 0 of none.
+    pub(super) name: u64,
 }
+
+/// Names for requests.
+static NAMES: AtomicU64 = AtomicU64::new(1);
 
 impl Requests {
     /// Collects what the viewers' pixels need, tile by tile, in the caller's thread pool. Pixels whose place is no number are
@@ -152,8 +158,8 @@ impl Requests {
         requests
     }
 
-    /// Turns what was gathered before into what [`Requests::gather`] would give now; tiles whose pixels are the same are not looked at again. Says
-    /// whether all are.
+    /// Turns what was gathered before into what [`Requests::gather`] would give now; tiles whose pixels are the same, to the bit, are not looked at
+    /// again. Says whether all are. For that a copy of the pixels is kept, 56 bytes each.
     pub fn gather_again(&mut self, views: &[View<'_>], look_up: &LookUp) -> bool {
         let tiles = views.iter().enumerate().flat_map(|(view, View { width, pixels })| {
             let (width, rows) = ((*width).max(1), pixels.len().div_ceil((*width).max(1)));
@@ -177,10 +183,14 @@ impl Requests {
             if held.is_of(tile, view) {
                 return true;
             }
-            *held = scratch.gather(view, tile, look_up);
+            scratch.gather(view, tile, look_up, held);
             false
         });
-        same.reduce(|| true, |a, b| a && b) && is_as_before
+        let same = same.reduce(|| true, |a, b| a && b) && is_as_before;
+        if !same || self.name == 0 {
+            self.name = NAMES.fetch_add(1, Ordering::Relaxed);
+        }
+        same
     }
 
     /// Texels wanted, counted once in each tile of 64×64 pixels.
@@ -201,12 +211,27 @@ impl Tile {
     }
 }
 
+/// Whether pixels are the same to the bit.
+fn are_same(a: &[Option<PixelPlace>], b: &[Option<PixelPlace>]) -> bool {
+    let bits = |pixel: &PixelPlace| {
+        let PixelPlace { instance, triangle, barycentrics: [v, w], place, footprint_m, lean: [x, y] } =
+            *pixel;
+        let ChartPlace { chart, uv: [s, t], depth, size, texel_m } = place;
+        ([instance, triangle, chart], size, [v, w, s, t, depth, texel_m, footprint_m, x, y].map(f32::to_bits))
+    };
+    let same =
+        |(a, b): (&Option<PixelPlace>, &Option<PixelPlace>)| a.as_ref().map(bits) == b.as_ref().map(bits);
+    a.len() == b.len() && a.iter().zip(b).all(same)
+}
+
 impl TileRequests {
-    /// Whether it is what this tile wants. Pixels that are no number are not even the same as themselves.
+    /// Whether it is what this tile wants.
     fn is_of(&self, tile: Tile, view: &View<'_>) -> bool {
         let mut held = self.pixels.chunks(self.across.max(1));
         let mut rows = tile.rows(view).filter(|row| !row.is_empty());
-        self.tile == tile && rows.all(|row| held.next() == Some(row)) && held.next().is_none()
+        self.tile == tile
+            && rows.all(|row| held.next().is_some_and(|held| are_same(held, row)))
+            && held.next().is_none()
     }
 }
 
@@ -297,11 +322,12 @@ struct Block {
 const _: () = assert!(TILE * TILE * 5 <= 1 << 16);
 
 impl Scratch {
-    fn gather(&mut self, view: &View<'_>, tile: Tile, look_up: &LookUp) -> TileRequests {
+    fn gather(&mut self, view: &View<'_>, tile: Tile, look_up: &LookUp, out: &mut TileRequests) {
         self.block_of.clear();
         self.blocks.clear();
         self.places.clear();
-        let (mut across, mut pixels) = (0, Vec::new());
+        let (mut across, mut pixels) = (0, std::mem::take(&mut out.pixels));
+        pixels.clear();
         for row in tile.rows(view) {
             across = across.max(row.len());
             pixels.extend_from_slice(row);
@@ -312,7 +338,7 @@ impl Scratch {
             }
         }
         let (blocks, places) = self.flatten();
-        TileRequests { tile, across, pixels, blocks, places }
+        *out = TileRequests { tile, across, pixels, blocks, places };
     }
 
     fn want(&mut self, pixel: &PixelPlace, look_up: &LookUp, last: &mut usize) {

@@ -70,9 +70,11 @@ fn variants() -> Vec<(String, Technique)> {
         let look_up = LookUp { bias, blend: false };
         all.push((format!("slc, one texel, bias {bias}"), ours(|c| c.shading.look_up = look_up)));
     }
-    for updates in [1, 2, 4] {
-        let few = ours(|c| c.params.first_updates = updates);
-        all.push((format!("slc, young for {updates} updates"), few));
+    for (samples, updates, then) in [(8, 8, 1), (16, 1, 2), (16, 4, 3)] {
+        let young = |c: &mut OurCones| {
+            (c.params.first_samples, c.params.first_updates, c.params.samples) = (samples, updates, then);
+        };
+        all.push((format!("slc, {updates} × {samples} samples at first, then {then}"), ours(young)));
     }
     for samples in [1, 4, 8, 16, 64] {
         let fixed = Samples::Fixed(samples);
