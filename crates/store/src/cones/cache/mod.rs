@@ -1,7 +1,8 @@
 //! The on-surface cache ([Stadlbauer2023] sec. 2.1): entries in blocks of 8×8 texels of the charts, for all viewers together.
 //!
 //! A frame is: [`Requests::gather`] what the viewers see, [`ConeCache::admit`] it, which gives an [`UpdateQueue`], trace what
-//! of it one can afford, [`ConeCache::update`] the entries, and read them with a [`Reader`]. Nothing here depends on the
+//! of it one can afford, [`ConeCache::update`] the entries, and read them with a [`Reader`]. Where nobody moved,
+//! [`Requests::gather_again`] and [`ConeCache::repeat`] take the place of the first two. Nothing here depends on the
 //! number of threads or on the layout of the hash map.
 
 mod admit;
@@ -39,7 +40,7 @@ pub struct CacheParams {
     pub most_bytes: u64,
     /// How many levels away a new entry looks for one to begin with, 0 … 4. Default 2.
     pub reuse_levels: u8,
-    /// Whether that may be a finer one: these go first. Default true; [Stadlbauer2023] sec. 2 knows coarser ones alone.
+    /// Whether that may be a finer one: these go first. Default true; [Stadlbauer2023] sec. 2.1 knows coarser ones alone.
     pub reuse_finer: bool,
     /// Most samples that what it begins with counts for, 1 … 4095. Default 16.
     pub reuse_samples: u16,
