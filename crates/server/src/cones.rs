@@ -118,7 +118,8 @@ impl<E: Update> ConeServer<E> {
         })
     }
 
-    /// Brings what the viewers see up to date. `now` is of the same scene in every step: what stays where it was is not looked up again. `pass` is called with the name of each stage after it: `requests`, `queue`, `places`, `rays`.
+    /// Brings what the viewers see up to date. `now` is of the same scene in every step: what stays where it was is not looked up again. `pass` is
+    /// called with the name of each stage after it: `requests`, `queue`, `places`, `rays`.
     pub fn step(
         &mut self,
         now: &Now<'_>,

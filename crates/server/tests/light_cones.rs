@@ -9,7 +9,7 @@ use dapple_render::gbuffer::{GBuffer, rasterize};
 use dapple_render::image::{LinearImage, Rgb8Image, ToneMap};
 use dapple_render::shade::shading_points;
 use dapple_render::slc::{Blending, CapTable, ConeLight, KeptCaps, SlcShading, pixel_places, shade_cones};
-use dapple_scene::area_lights::Pick;
+use dapple_scene::area_lights::{Environment, Pick};
 use dapple_scene::glam::Vec3;
 use dapple_scene::{NoFiles, PosedCamera, Scene, ShadingPoint, builtin};
 use dapple_server::cones::{ConeServer, ConeStep, Now, cone_charts};
@@ -104,11 +104,13 @@ fn ways() -> Vec<Lit> {
         Lit::new("slc, all cones", SlcShading { blending: Blending::Cones, ..shading }, true),
         Lit::new("slc, one texel", SlcShading { look_up: near, ..shading }, true),
         Lit::new("slc, bias 2", SlcShading { look_up: wide, ..shading }, true),
-        Lit {
-            params: SlcParams { first_updates: 1, samples: 2, ..SlcParams::default() },
-            ..Lit::new("slc, quick", SlcShading { look_up: wide, ..shading }, true)
-        },
+        sampled("slc, quick", wide, SlcParams { first_updates: 1, samples: 2, ..SlcParams::default() }),
     ]
+}
+
+/// Cones that are sampled otherwise.
+fn sampled(name: &'static str, look_up: LookUp, params: SlcParams) -> Lit {
+    Lit { params, ..Lit::new(name, SlcShading { look_up, ..SlcShading::default() }, true) }
 }
 
 /// Quality of each way after so many steps, and a table if asked.
@@ -213,6 +215,34 @@ fn things_that_roll_are_no_brighter_than_by_rays() {
             println!("{db:.2} dB, {bias:+.2} %");
             assert!(bias.abs() < 1.5 && db > 26.0, "{bias} %, {db} dB");
         }
+    }
+}
+
+/// A sky that is hardly seen from inside a box: few samples of young entries reach it, and what they bring is all there in the mean of several seeds.
+#[test]
+fn light_of_a_sky_is_all_there_while_entries_are_young() {
+    let hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n\x80\x80\x80\x82\x80\x80\x80\x82";
+    let sky = Environment::from_hdr(hdr).unwrap();
+    let stage = Stage::new("cornell", 0.2, [96, 54]);
+    let pose = stage.scene.pose(1.0);
+    let tracer = Tracer::new(&stage.scene, &pose);
+    let now = Now { scene: &stage.scene, pose: &pose, tracer: &tracer, environment: Some(&sky) };
+    let path = stage.scene.camera_paths().into_iter().find(|path| path.name == "path-box").unwrap();
+    let seen_at = |time_s| stage.see_from(&now, path.camera(&stage.scene, &stage.scene.pose(time_s)));
+    let params = DirectParams { samples: 2048, seed: 7, ..DirectParams::default() };
+    let truth = rays(&now, &seen_at(1.0).points, &params);
+    for (walks, steps) in [(0.0, 2), (0.0, 8), (1.0, 8)] {
+        let bias = |seed| {
+            let mut lit = Lit::new("", SlcShading::default(), false);
+            lit.params.seed = seed;
+            for step in (0..steps).rev() {
+                lit.step(&stage, &now, Some(&seen_at(1.0 - walks * f64::from(step) / 15.0)));
+            }
+            stage.quality(&truth, &lit.picture)[2]
+        };
+        let mean = (0..10).map(bias).sum::<f64>() / 10.0;
+        println!("{steps} steps, walks {walks}: {mean:+.2} %");
+        assert!(mean.abs() < 1.5, "{mean} % after {steps} steps");
     }
 }
 
@@ -397,9 +427,10 @@ fn median(ms: &[f64]) -> f64 {
 }
 
 /// Plays a scene to a viewer who stands or walks, methods in turn; prints what the last steps took, and how the last picture is.
-fn play(stage: &Stage, walks: bool, (steps, timed, samples): (u32, u32, u32)) {
+fn play(stage: &Stage, walks: bool, more: Vec<Lit>, (steps, timed, samples): (u32, u32, u32)) {
     let mut rivals = Rival::all();
     let mut cones = ways();
+    cones.extend(more);
     let camera = stage.scene.camera_paths()[0].camera(&stage.scene, &stage.scene.pose(stage.time_s));
     let mut tracer = Tracer::new(&stage.scene, &stage.scene.pose(stage.time_s));
     for step in 0..steps {
@@ -448,16 +479,31 @@ fn play(stage: &Stage, walks: bool, (steps, timed, samples): (u32, u32, u32)) {
 fn lights_that_move() {
     for name in ["street", "hangar"] {
         println!("{name}\n| | ms a step | server's | PSNR | SSIM | bias, % |");
-        play(&Stage::new(name, 0.3, [320, 180]), false, (40, 5, 256));
+        let look_up = LookUp { bias: 1.4, blend: false };
+        let few = SlcParams { changed_samples: 6, ..SlcParams::default() };
+        let coarse = sampled("one texel 1.4 pixels wide, 6 samples of what changed", look_up, few);
+        play(&Stage::new(name, 0.3, [320, 180]), false, vec![coarse], (40, 5, 256));
     }
 }
 
-/// Prints what a step takes while the viewer walks.
+/// Prints what a step takes while the viewer walks, with samples of young entries in so many updates and so many a frame after that.
 #[test]
 #[ignore = "measures; a minute"]
 fn a_viewer_who_walks() {
     for name in ["atrium-lamps", "village"] {
         println!("{name}\n| | ms a step | server's | PSNR | SSIM | bias, % |");
-        play(&Stage::new(name, 0.3, [192, 108]), true, (24, 8, 256));
+        let more = [
+            ("8 x 8, 1", 8, 8, 1),
+            ("8 x 2, 1", 8, 2, 1),
+            ("16 x 1, 2", 16, 1, 2),
+            ("16 x 2, 2", 16, 2, 2),
+            ("16 x 3, 3", 16, 3, 3),
+            ("32 x 1, 2", 32, 1, 2),
+        ];
+        let more = more.map(|(name, first_samples, first_updates, samples)| {
+            let params = SlcParams { first_samples, first_updates, samples, ..SlcParams::default() };
+            sampled(name, LookUp::default(), params)
+        });
+        play(&Stage::new(name, 0.3, [192, 108]), true, more.into(), (24, 8, 256));
     }
 }

@@ -124,7 +124,7 @@ impl Technique {
         self.changed(|cones| cones.shading.look_up.bias = pixels)
     }
 
-    /// Our cones for a quarter of the rays: texels two pixels wide, and entries that are young for one update.
+    /// Our cones for a quarter of the rays, half where lights move: texels two pixels wide, and entries that are young for one update.
     pub(crate) fn quick_cones() -> Technique {
         let params = SlcParams { first_updates: 1, samples: 2, ..SlcParams::default() };
         Technique::cones().with_texels(2.0).changed(|cones| cones.params = params)

@@ -45,6 +45,18 @@ fn cone(seen: f32, energy: f32) -> MomentCone {
     MomentCone { seen, ..cone }
 }
 
+/// A place between four texels.
+fn between_four() -> PixelPlace {
+    PixelPlace {
+        instance: 0,
+        triangle: 0,
+        barycentrics: [0.25; 2],
+        place: ChartPlace { chart: 0, uv: [8.0; 2], depth: 0.0, size: [50, 50], texel_m: 1.0 },
+        footprint_m: 1.0,
+        lean: [0.0; 2],
+    }
+}
+
 /// What a place shows whose four entries hold these cones, young ones.
 fn shaded(point: &ShadingPoint, cones: [&[MomentCone]; 4], lights: Option<&AreaLightTable>) -> Vec3 {
     shaded_after(16, point, cones, lights)
@@ -57,16 +69,7 @@ fn shaded_after(
     cones: [&[MomentCone]; 4],
     lights: Option<&AreaLightTable>,
 ) -> Vec3 {
-    let place = ChartPlace { chart: 0, uv: [8.0; 2], depth: 0.0, size: [50, 50], texel_m: 1.0 };
-    let pixel = PixelPlace {
-        instance: 0,
-        triangle: 0,
-        barycentrics: [0.25; 2],
-        place,
-        footprint_m: 1.0,
-        lean: [0.0; 2],
-    };
-    let pixels = [Some(pixel)];
+    let pixels = [Some(between_four())];
     let mut cache = ConeCache::<MomentEntry>::new(CacheParams::default()).unwrap();
     let queue = cache.admit(&Requests::gather(&[View { width: 1, pixels: &pixels }], &LookUp::default()));
     assert_eq!(queue.texels.len(), 4, "a place between four texels");
@@ -154,15 +157,7 @@ fn settled_entries_show_parts_by_their_cones_and_what_is_narrow_and_whole_by_its
 #[test]
 fn caps_that_are_kept_are_as_if_made_anew() {
     let point = floor(0.5);
-    let place = ChartPlace { chart: 0, uv: [8.0; 2], depth: 0.0, size: [50, 50], texel_m: 1.0 };
-    let pixels = [Some(PixelPlace {
-        instance: 0,
-        triangle: 0,
-        barycentrics: [0.25; 2],
-        place,
-        footprint_m: 1.0,
-        lean: [0.0; 2],
-    })];
+    let pixels = [Some(between_four())];
     let mut cache = ConeCache::<MomentEntry>::new(CacheParams::default()).unwrap();
     let queue = cache.admit(&Requests::gather(&[View { width: 1, pixels: &pixels }], &LookUp::default()));
     let holds = |energy: f32| MomentEntry::from_parts(&[cone(0.9, energy)], 16, 16);

@@ -50,8 +50,8 @@ impl EntryPlaces {
         places
     }
 
-    /// Turns the places of the frame before, found in the pose `before` of the same scene for the same cache, into what [`EntryPlaces::of`] would give: what stayed where it
-    /// was is not looked up again.
+    /// Turns the places of the frame before, found in the pose `before` of the same scene for the same cache, into what [`EntryPlaces::of`] would
+    /// give: what stayed where it was is not looked up again.
     pub fn follow<E: ConeEntry>(
         &mut self,
         cache: &ConeCache<E>,
