@@ -98,11 +98,13 @@ fn ways() -> Vec<Lit> {
     let near = LookUp { blend: false, ..LookUp::default() };
     let wide = LookUp { bias: 2.0, ..LookUp::default() };
     let shading = SlcShading::default();
+    // Nothing is blended that would have other places on lights.
+    let alone = SlcParams { together: 1, ..SlcParams::default() };
     vec![
         Lit::new("slc by cones alone", shading, false),
         Lit::new("slc", shading, true),
         Lit::new("slc, all cones", SlcShading { blending: Blending::Cones, ..shading }, true),
-        Lit::new("slc, one texel", SlcShading { look_up: near, ..shading }, true),
+        sampled("slc, one texel", near, alone),
         Lit::new("slc, bias 2", SlcShading { look_up: wide, ..shading }, true),
         sampled("slc, quick", wide, SlcParams { first_updates: 1, samples: 2, ..SlcParams::default() }),
     ]
@@ -114,7 +116,12 @@ fn sampled(name: &'static str, look_up: LookUp, params: SlcParams) -> Lit {
 }
 
 /// Quality of each way after so many steps, and a table if asked.
-fn measure(stage: &Stage, steps: usize, timed: usize, samples: u32) -> Vec<(&'static str, [f64; 3])> {
+fn measure(
+    stage: &Stage,
+    (steps, timed): (usize, usize),
+    samples: u32,
+    seed: u64,
+) -> Vec<(&'static str, [f64; 3])> {
     let pose = stage.scene.pose(stage.time_s);
     let tracer = Tracer::new(&stage.scene, &pose);
     let now = Now { scene: &stage.scene, pose: &pose, tracer: &tracer, environment: None };
@@ -122,6 +129,7 @@ fn measure(stage: &Stage, steps: usize, timed: usize, samples: u32) -> Vec<(&'st
     let params = DirectParams { samples, seed: 7, ..DirectParams::default() };
     let truth = rays(&now, &seen.points, &params);
     let mut ways = ways();
+    ways.iter_mut().for_each(|lit| lit.params.seed = seed);
     for _ in 0..steps {
         ways.iter_mut().for_each(|lit| lit.step(stage, &now, Some(&seen)));
     }
@@ -159,12 +167,17 @@ fn measure(stage: &Stage, steps: usize, timed: usize, samples: u32) -> Vec<(&'st
     found.collect()
 }
 
-/// Flames close to what they light, over ground whose normals lean every way: light that is lost shows.
+/// Flames close to what they light, over ground whose normals lean every way: light that is lost shows. In the mean of some seeds, since entries that share
+/// places on lights err alike, and a picture so small has few groups of them.
 #[test]
 fn the_mean_light_of_a_village_is_that_of_rays() {
     let stage = Stage::new("village", 0.1, [96, 54]);
-    for (name, [db, _, bias]) in measure(&stage, 24, 0, 256) {
-        assert!(bias.abs() < 4.0 && db > 22.0, "{name}: {bias} %, {db} dB");
+    let runs = [0, 1, 2, 3].map(|seed| measure(&stage, (24, 0), 256, seed));
+    for (way, (name, _)) in runs[0].iter().enumerate() {
+        let bias = runs.iter().map(|run| run[way].1[2]).sum::<f64>() / runs.len() as f64;
+        let least = runs.iter().map(|run| run[way].1[0]).fold(f64::INFINITY, f64::min);
+        println!("{name}: {bias:+.2} %, {least:.2} dB");
+        assert!(bias.abs() < 4.0 && least > 22.0, "{name}: {bias} %, {least} dB");
     }
 }
 
@@ -286,7 +299,7 @@ fn what_changed_out_of_sight_is_learnt_when_it_comes_back() {
 fn quality_and_time() {
     for name in ["atrium-lamps", "village", "hangar"] {
         println!("{name}\n| | times as quick | PSNR | SSIM | bias, % |");
-        measure(&Stage::new(name, 0.3, [320, 180]), 260, 5, 512);
+        measure(&Stage::new(name, 0.3, [320, 180]), (260, 5), 512, 0);
     }
 }
 
@@ -480,7 +493,7 @@ fn lights_that_move() {
     for name in ["street", "hangar"] {
         println!("{name}\n| | ms a step | server's | PSNR | SSIM | bias, % |");
         let look_up = LookUp { bias: 1.4, blend: false };
-        let few = SlcParams { changed_samples: 6, ..SlcParams::default() };
+        let few = SlcParams { changed_samples: 6, together: 1, ..SlcParams::default() };
         let coarse = sampled("one texel 1.4 pixels wide, 6 samples of what changed", look_up, few);
         play(&Stage::new(name, 0.3, [320, 180]), false, vec![coarse], (40, 5, 256));
     }

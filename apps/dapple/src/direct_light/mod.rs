@@ -114,9 +114,9 @@ impl Technique {
         self.changed(|cones| cones.params = SlcParams { pick, sequence, ..cones.params })
     }
 
-    /// Our cones, of a pixel's own texel alone.
+    /// Our cones, of a pixel's own texel alone: nothing is blended that would have other places on lights, so all may share them.
     pub(crate) fn without_blending(self) -> Technique {
-        self.changed(|cones| cones.shading.look_up.blend = false)
+        self.changed(|cones| (cones.shading.look_up.blend, cones.params.together) = (false, 1))
     }
 
     /// Our cones, of texels so many pixels wide.

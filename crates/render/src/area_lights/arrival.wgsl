@@ -122,23 +122,36 @@ fn area_quad(slot: i32, ball: vec4<f32>, position: vec3<f32>, height: f32, norma
         let area = 0.5 * length(cross(c - a, d - b));
         return offset * (area * height / (distance_squared * distance_squared));
     }
-    let vector = (area_edge(a, b) + area_edge(b, c) + area_edge(c, d) + area_edge(d, a)) * 0.5;
+    let p = area_corner(a);
+    let q = area_corner(b);
+    let r = area_corner(c);
+    let s = area_corner(d);
+    let vector = (area_edge(p, q) + area_edge(q, r) + area_edge(r, s) + area_edge(s, p)) * 0.5;
     // Corners may turn either way.
     return select(vector, -vector, dot(vector, normal) > 0.0);
 }
 
-fn area_edge(a: vec3<f32>, b: vec3<f32>) -> vec3<f32> {
-    let both = max(length(a) * length(b), 1e-30);
-    let cosine = clamp(dot(a, b) / both, -1.0, 1.0);
-    return cross(a, b - a) * (area_angle_over_sine(cosine) / both);
+// Corners, with their lengths.
+fn area_edge(a: vec4<f32>, b: vec4<f32>) -> vec3<f32> {
+    let both = max(a.w * b.w, 1e-30);
+    let cosine = clamp(dot(a.xyz, b.xyz) / both, -1.0, 1.0);
+    return cross(a.xyz, b.xyz - a.xyz) * (area_angle_over_sine(cosine) / both);
+}
+
+fn area_corner(offset: vec3<f32>) -> vec4<f32> {
+    return vec4(offset, length(offset));
 }
 
 fn area_angle_over_sine(cosine: f32) -> f32 {
-    let miss = 1.0 - cosine;
-    if miss < 0.01 {
-        return 1.0 + miss * (1.0 / 3.0 + miss * (2.0 / 15.0));
-    }
-    return acos(cosine) / sqrt(max(1.0 - cosine * cosine, 1e-8));
+    let x = abs(cosine);
+    var p = -0.0012624911 * x + 0.00667009;
+    p = p * x - 0.017088126;
+    p = p * x + 0.03089188;
+    p = p * x - 0.050174305;
+    p = p * x + 0.08897899;
+    p = p * x - 0.2145988;
+    p = (p * x + 1.5707963) / sqrt(1.0 + x);
+    return select(AREA_PI / sqrt(max((1.0 - x) * (1.0 + x), 1e-8)) - p, p, cosine >= 0.0);
 }
 
 // Form factor of what lies above the horizon of a cone whose axis has that cosine and whose angle has that squared sine.
@@ -239,8 +252,11 @@ fn area_from_triangles(
         if (facing <= 0.0 && !two_sided) || abs(facing) <= AREA_IN_PLANE_RADII * radius * length(across) {
             continue;
         }
+        let p = area_corner(a);
+        let q = area_corner(b);
+        let r = area_corner(c);
         // Seen from the front, corners turn against the view.
-        let vector = (area_edge(a, b) + area_edge(b, c) + area_edge(c, a)) * select(0.5, -0.5, facing > 0.0);
+        let vector = (area_edge(p, q) + area_edge(q, r) + area_edge(r, p)) * select(0.5, -0.5, facing > 0.0);
         let vector_length = length(vector);
         if vector_length <= 0.0 {
             continue;

@@ -30,12 +30,14 @@ pub struct Chooser {
     pick: Pick,
     /// Running sums of weights, one a light; [`Pick::Power`] keeps none.
     sums: Vec<f32>,
+    /// Weights while they are gathered ([`Chooser::aim_among`]).
+    own: Vec<f32>,
 }
 
 impl Chooser {
     /// One that picks so. Aim it before it is used.
     pub fn new(pick: Pick) -> Chooser {
-        Chooser { pick, sums: Vec::new() }
+        Chooser { pick, ..Chooser::default() }
     }
 
     /// Prepares for samples at a place on a surface with that unit normal; a zero normal is a place in the open, which sees all around.
@@ -58,6 +60,38 @@ impl Chooser {
                 }
             }
         }
+    }
+
+    /// Prepares for samples that several places share, each given as of [`Chooser::aim`]: the mean of the probabilities that each would have. A light that can
+    /// arrive at any of them may be picked.
+    pub fn aim_among(
+        &mut self,
+        lights: &AreaLights<'_>,
+        places_world: impl IntoIterator<Item = (Vec3, Vec3)>,
+    ) {
+        if self.pick != Pick::Fluence {
+            self.aim(lights, Vec3::ZERO, Vec3::ZERO);
+            return;
+        }
+        let mut own = std::mem::take(&mut self.own);
+        own.clear();
+        own.resize(lights.len(), 0.0);
+        for (position, normal) in places_world {
+            self.aim(lights, position, normal);
+            let Some(scale) = self.sums.last().filter(|sum| **sum > 0.0).map(|sum| 1.0 / sum) else {
+                continue;
+            };
+            for (light, weight) in own.iter_mut().enumerate() {
+                *weight += weight_of(&self.sums, light) * scale;
+            }
+        }
+        let mut sum = 0.0f32;
+        self.sums.clear();
+        self.sums.extend(own.iter().map(|weight| {
+            sum += weight;
+            sum
+        }));
+        self.own = own;
     }
 
     /// Probability of picking a light.
@@ -130,7 +164,7 @@ impl AreaLights<'_> {
         let Some(l) = self.lights.get(light) else {
             return self.environment.map_or(0.0, |(_, mean, _)| PI * luminance(mean).max(0.0));
         };
-        let radiance = luminance(l.radiance).max(0.0);
+        let radiance = l.brightness;
         let (center, radius) = l.shape.ball();
         if radius <= 0.0 || radiance <= 0.0 {
             return 0.0;
@@ -160,13 +194,13 @@ impl AreaLights<'_> {
                 if facing <= 0.0 {
                     return 0.0;
                 }
-                let area = l.shape.area();
+                let area = l.area;
                 area * cosine(*normal * if height < 0.0 { -1.0 } else { 1.0 }, -offset)
                     / (distance2 + area / PI)
             }
             // Seen from outside, bodies show a quarter of their surface (Cauchy).
             Shape::Triangles(_) => {
-                let area = l.shape.area() * if l.two_sided { 0.5 } else { 0.25 };
+                let area = l.area * if l.two_sided { 0.5 } else { 0.25 };
                 area / (distance2 + area / PI)
             }
         };

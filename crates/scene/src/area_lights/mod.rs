@@ -45,6 +45,10 @@ struct AreaLight {
     shape: Shape,
     /// Mean over its area.
     radiance: Vec3,
+    /// Luminance of that, not below 0.
+    brightness: f32,
+    /// Of its shape, m².
+    area: f32,
     /// Shines from both sides of its surface.
     two_sided: bool,
 }
@@ -157,9 +161,7 @@ impl<'a> AreaLights<'a> {
     pub fn power_of(&self, light: usize) -> f32 {
         use std::f32::consts::PI;
         match self.lights.get(light) {
-            Some(l) => {
-                PI * l.shape.area() * luminance(l.radiance).max(0.0) * if l.two_sided { 2.0 } else { 1.0 }
-            }
+            Some(l) => PI * l.area * l.brightness * if l.two_sided { 2.0 } else { 1.0 },
             None => self
                 .environment
                 .map_or(0.0, |(_, mean, radius)| 4.0 * PI * PI * radius * radius * luminance(mean)),
@@ -168,7 +170,7 @@ impl<'a> AreaLights<'a> {
 
     /// Centre and radius, metres, of a ball that holds the light; `None` for the environment and what is not there.
     pub fn bounds(&self, light: usize) -> Option<(Vec3, f32)> {
-        self.lights.get(light).filter(|l| l.shape.area() > 0.0).map(|l| l.shape.ball())
+        self.lights.get(light).filter(|l| l.area > 0.0).map(|l| l.shape.ball())
     }
 
     /// Which lights differ from those of another moment of the same scene: moved, changed, came or went.
@@ -220,13 +222,7 @@ impl<'a> AreaLights<'a> {
             });
         };
         let place = l.shape.sample(position_world, l.two_sided, u)?;
-        let radiance = match place.emission {
-            Emission::Mean => l.radiance,
-            Emission::Constant(radiance) => radiance,
-            Emission::Textured(material, uv) => {
-                crate::texture::emission(self.scene, &self.scene.materials[material as usize], &uv)
-            }
-        };
+        let radiance = self.emitted_at(l, place.emission);
         Some(LightSample {
             light,
             to_light_world: place.direction,
@@ -234,6 +230,64 @@ impl<'a> AreaLights<'a> {
             radiance,
             density_per_sr: place.density,
             normal_on_light_world: place.normal,
+        })
+    }
+
+    /// A place on a light for receivers anywhere in a ball (centre and radius, metres), `u` as of [`AreaLights::sample`], the first the rest of the choice.
+    /// All that any of them can see of the light has a density, so each may take it as a sample of its own: rays from it to all of them
+    /// start in one point. `None` where they had better choose for themselves: of the environment, of a sphere that is near for the ball's size, where
+    /// the ball lies on both sides of a light that shines from both.
+    pub fn spot(&self, light: u32, (center, radius): (Vec3, f32), u: [f32; 3]) -> Option<LightSpot> {
+        let l = self.lights.get(light as usize)?;
+        let spot = l.shape.spot((center, radius), l.two_sided, u)?;
+        Some(LightSpot {
+            light,
+            position_world: spot.position,
+            normal_world: spot.normal,
+            radiance: self.emitted_at(l, spot.emission),
+            area_m2: spot.area,
+        })
+    }
+
+    fn emitted_at(&self, light: &AreaLight, emission: Emission) -> Vec3 {
+        match emission {
+            Emission::Mean => light.radiance,
+            Emission::Constant(radiance) => radiance,
+            Emission::Textured(material, uv) => {
+                crate::texture::emission(self.scene, &self.scene.materials[material as usize], &uv)
+            }
+        }
+    }
+}
+
+/// A place on a light that several receivers share: [`AreaLights::spot`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightSpot {
+    /// Index of the light, below [`AreaLights::len`].
+    pub light: u32,
+    /// Metres.
+    pub position_world: Vec3,
+    /// Unit normal of the light there; of what shines from both sides, on that of the receivers.
+    pub normal_world: Vec3,
+    /// W/(m² sr), RGB.
+    pub radiance: Vec3,
+    /// One over the probability density of the place by area, m².
+    pub area_m2: f32,
+}
+
+impl LightSpot {
+    /// What a receiver sees of it; `None` from behind. The density is that of the place alone.
+    #[inline]
+    pub fn seen_from(&self, position_world: Vec3) -> Option<LightSample> {
+        let (to_light_world, distance_m, density_per_sr, _) =
+            shape::look(self.position_world, self.normal_world, self.area_m2, false, position_world)?;
+        Some(LightSample {
+            light: self.light,
+            to_light_world,
+            distance_m,
+            radiance: self.radiance,
+            density_per_sr,
+            normal_on_light_world: self.normal_world,
         })
     }
 }

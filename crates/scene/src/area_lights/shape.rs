@@ -71,7 +71,7 @@ pub(super) struct Triangles {
     ball: (Vec3, f32),
 }
 
-/// A place on a shape, from elsewhere.
+/// A place on a shape, seen from elsewhere.
 pub(super) struct Place {
     pub(super) direction: Vec3,
     pub(super) distance: f32,
@@ -111,8 +111,10 @@ impl AreaLight {
             EmitterShape::Rectangle => analytic(flat(scene, pose, index, first, false)),
         };
         let area = shape.area();
-        let shape = if area > 0.0 && area.is_finite() { shape } else { Shape::Nothing };
-        AreaLight { instance, shape, radiance, two_sided }
+        let (shape, area) =
+            if area > 0.0 && area.is_finite() { (shape, area) } else { (Shape::Nothing, 0.0) };
+        let brightness = super::luminance(radiance).max(0.0);
+        AreaLight { instance, shape, radiance, brightness, area, two_sided }
     }
 }
 
@@ -350,60 +352,131 @@ impl Shape {
 
     pub(super) fn sample(&self, from: Vec3, two_sided: bool, u: [f32; 3]) -> Option<Place> {
         match self {
-            Shape::Nothing => None,
             Shape::Sphere { center, radius } => sample_sphere(*center, *radius, from, [u[1], u[2]]),
+            _ => self.on_area(u)?.seen_from(from, two_sided),
+        }
+    }
+
+    /// A place by area, wherever it is looked at from; `None` of balls, which are chosen from by what is seen of them.
+    pub(super) fn on_area(&self, u: [f32; 3]) -> Option<Spot> {
+        match self {
+            Shape::Nothing | Shape::Sphere { .. } => None,
             Shape::Disc { center, normal, radius } => {
                 let (sin, cos) = sin_cos_turns(u[2]);
                 let r = radius * u[1].max(0.0).sqrt();
                 let [tangent, bitangent] = basis(*normal);
-                let at = *center + (tangent * cos + bitangent * sin) * r;
-                by_area(at, *normal, PI * radius * radius, two_sided, from, Emission::Mean)
+                let position = *center + (tangent * cos + bitangent * sin) * r;
+                Some(Spot { position, normal: *normal, area: PI * radius * radius, emission: Emission::Mean })
             }
             Shape::Rectangle { center, half: [a, b], normal } => {
-                let at = *center + *a * (2.0 * u[1] - 1.0) + *b * (2.0 * u[2] - 1.0);
-                by_area(at, *normal, 4.0 * a.cross(*b).length(), two_sided, from, Emission::Mean)
+                let position = *center + *a * (2.0 * u[1] - 1.0) + *b * (2.0 * u[2] - 1.0);
+                let area = 4.0 * a.cross(*b).length();
+                Some(Spot { position, normal: *normal, area, emission: Emission::Mean })
             }
             Shape::Triangles(t) => {
                 let total = *t.weight.last()?;
                 let i = t.weight.partition_point(|sum| *sum <= u[0] * total).min(t.weight.len() - 1);
                 let [a, b, c] = t.corners[i];
                 let cross = (b - a).cross(c - a);
-                let area = 0.5 * cross.length();
                 let [p, q] = fold([u[1], u[2]]);
-                let at = a + (b - a) * p + (c - a) * q;
-                // As if the whole light had this triangle's density.
-                let area = area * total / t.own_weight(i);
                 let emission = match &t.textured[i] {
                     Some((material, uvs)) => Emission::Textured(*material, blend(uvs, p, q)),
                     None => Emission::Constant(t.plain[i]),
                 };
-                by_area(at, cross.try_normalize()?, area, two_sided, from, emission)
+                Some(Spot {
+                    position: a + (b - a) * p + (c - a) * q,
+                    normal: cross.try_normalize()?,
+                    // As if the whole light had this triangle's density.
+                    area: 0.5 * cross.length() * total / t.own_weight(i),
+                    emission,
+                })
             }
         }
     }
+
+    /// A place for all that may stand in a ball: for everyone in it, all that can be seen of the shape has a density. `None` where that would be of
+    /// little use: the ball holds places on both sides of what shines from both, or is near a sphere for its size.
+    pub(super) fn spot(&self, (from, spread): (Vec3, f32), two_sided: bool, u: [f32; 3]) -> Option<Spot> {
+        let Shape::Sphere { center, radius } = self else {
+            let spot = self.on_area(u)?;
+            let height = spot.normal.dot(from - spot.position);
+            if !two_sided {
+                return Some(spot);
+            }
+            let normal = if height < 0.0 { -spot.normal } else { spot.normal };
+            return (height.abs() > spread).then_some(Spot { normal, ..spot });
+        };
+        let offset = from - *center;
+        let distance = offset.length();
+        // Written so that it is false of what is no number.
+        let is_far = spread <= NEAR_SPHERE * (distance - radius);
+        if !is_far || radius <= &0.0 {
+            return None;
+        }
+        // As the middle of the ball would choose, and now and then anywhere on the cap that somebody in the ball sees: by the angle at the centre of the
+        // sphere, that of the farthest, and as much as they stand aside.
+        let (cos_seen, sin_aside) = (radius / (distance + spread), spread / distance);
+        let [sin_seen, cos_aside] = [cos_seen, sin_aside].map(|x| (1.0 - x * x).max(0.0).sqrt());
+        let height = 1.0 - (cos_seen * cos_aside - sin_seen * sin_aside);
+        let anywhere = (2.0 * sin_aside).clamp(LEAST_ANYWHERE, 0.5);
+        let normal = if u[1] < anywhere {
+            let below = height * u[1] / anywhere;
+            around(offset / distance, below, u[2])
+        } else {
+            let rest = (u[1] - anywhere) / (1.0 - anywhere);
+            sample_sphere(*center, *radius, from, [rest, u[2]])?.normal
+        };
+        let position = *center + normal * *radius;
+        let to_middle = from - position;
+        let distance2 = to_middle.length_squared();
+        // Uniform by solid angle from there, as an area has it.
+        let facing = normal.dot(to_middle).max(0.0) / (distance2 * distance2.sqrt());
+        let by_middle = facing / (TAU * cap_height(radius * radius / (distance * distance)));
+        let by_cap = 1.0 / (TAU * radius * radius * height);
+        let area = 1.0 / (by_middle * (1.0 - anywhere) + by_cap * anywhere);
+        Some(Spot { position, normal, area, emission: Emission::Mean })
+    }
 }
 
-fn by_area(
+/// Size of a group of places against their distance from a sphere up to which they share places on it.
+const NEAR_SPHERE: f32 = 0.25;
+/// Least part of the places on it that are chosen evenly.
+const LEAST_ANYWHERE: f32 = 0.02;
+
+/// A place on a shape, chosen by area.
+pub(super) struct Spot {
+    pub(super) position: Vec3,
+    /// Unit, on the side that shines.
+    pub(super) normal: Vec3,
+    /// One over its density, m².
+    pub(super) area: f32,
+    pub(super) emission: Emission,
+}
+
+impl Spot {
+    fn seen_from(self, from: Vec3, two_sided: bool) -> Option<Place> {
+        let Spot { position, normal, area, emission } = self;
+        let (direction, distance, density, side) = look(position, normal, area, two_sided, from)?;
+        Some(Place { direction, distance, density, normal: normal * side, emission })
+    }
+}
+
+/// Direction to a place from elsewhere, distance, density by solid angle, and on which side of it that is (±1); `None` where its back is seen.
+pub(super) fn look(
     at: Vec3,
     normal: Vec3,
     area: f32,
     two_sided: bool,
     from: Vec3,
-    emission: Emission,
-) -> Option<Place> {
+) -> Option<(Vec3, f32, f32, f32)> {
     let offset = at - from;
-    let distance = offset.length();
-    let direction = offset.try_normalize()?;
+    let distance2 = offset.length_squared();
+    let distance = distance2.sqrt();
+    let direction = offset / distance;
     let facing = -normal.dot(direction);
-    let (cosine, normal) = if facing < 0.0 && two_sided { (-facing, -normal) } else { (facing, normal) };
-    let density = distance * distance / (cosine * area);
-    (cosine > 0.0 && density.is_finite() && density > 0.0).then_some(Place {
-        direction,
-        distance,
-        density,
-        normal,
-        emission,
-    })
+    let (cosine, side) = if facing < 0.0 && two_sided { (-facing, -1.0) } else { (facing, 1.0) };
+    let density = distance2 / (cosine * area);
+    (cosine > 0.0 && density.is_finite() && density > 0.0).then_some((direction, distance, density, side))
 }
 
 /// Uniform in the cone that a ball fills ([Shirley1996]); nothing from inside.
@@ -417,20 +490,30 @@ fn sample_sphere(center: Vec3, radius: f32, from: Vec3, u: [f32; 2]) -> Option<P
     let distance = distance2.sqrt();
     let axis = offset / distance;
     let sin2 = r2 / distance2;
-    // 1 − cos, without cancellation where the ball is small.
-    let height = sin2 / (1.0 + (1.0 - sin2).max(0.0).sqrt());
+    let height = cap_height(sin2);
     let below = height * u[0];
     let cos = 1.0 - below;
     let sin = (below * (2.0 - below)).max(0.0).sqrt();
-    let (s, c) = sin_cos_turns(u[1]);
-    let [tangent, bitangent] = basis(axis);
-    let direction = ((tangent * c + bitangent * s) * sin + axis * cos).normalize();
+    let direction = around(axis, below, u[1]);
     // The nearer of the two places where the ray meets the ball.
     let along = distance * cos;
     let inside = (r2 - distance2 * sin * sin).max(0.0).sqrt();
     let hit = along - inside;
     let normal = (from + direction * hit - center).try_normalize()?;
     Some(Place { direction, distance: hit, density: 1.0 / (TAU * height), normal, emission: Emission::Mean })
+}
+
+/// 1 − cos of an angle by its squared sine, without cancellation where it is small.
+fn cap_height(sin2: f32) -> f32 {
+    sin2 / (1.0 + (1.0 - sin2).max(0.0).sqrt())
+}
+
+/// The unit vector whose angle to an axis has 1 − cos = `below`, turned about it.
+fn around(axis: Vec3, below: f32, turns: f32) -> Vec3 {
+    let (cos, sin) = (1.0 - below, (below * (2.0 - below)).max(0.0).sqrt());
+    let (s, c) = sin_cos_turns(turns);
+    let [tangent, bitangent] = basis(axis);
+    ((tangent * c + bitangent * s) * sin + axis * cos).normalize()
 }
 
 /// Two unit vectors at right angles to a unit vector and each other ([Duff2017]).

@@ -400,3 +400,80 @@ fn a_light_keeps_its_index_and_tells_when_it_changed() {
     assert_eq!((without.len(), without.power_of(0), without.bounds(0)), (2, 0.0, None));
     assert_eq!(without.instance(1), Some(1));
 }
+
+/// Receivers at the middle and the rim of a ball, who share places on lights of every shape.
+#[test]
+fn places_that_receivers_share_have_a_density_for_each() {
+    let at = |x: f32, y: f32, z: f32, r: f32| {
+        Affine3A::from_translation(Vec3::new(x, y, z)) * Affine3A::from_scale(Vec3::splat(r))
+    };
+    let mut stage = Stage::new();
+    stage.add(octahedron(), EmitterShape::Sphere, Vec3::splat(3.0), at(1.0, 2.0, 0.5, 0.5));
+    // As near as it may be for a ball of 0.2 m.
+    stage.add(octahedron(), EmitterShape::Sphere, Vec3::splat(3.0), at(0.0, 1.31, 0.0, 0.5));
+    stage.add(octahedron(), EmitterShape::Triangles, Vec3::splat(3.0), at(-1.0, 1.0, 0.5, 0.4));
+    stage.add(square(), EmitterShape::Disc, Vec3::splat(3.0), down(1.0, Vec2::splat(0.5)));
+    stage.add(square(), EmitterShape::Rectangle, Vec3::splat(3.0), down(2.0, Vec2::new(1.5, 0.2)));
+    let two_sided = down(2.5, Vec2::splat(1.0)) * Affine3A::from_rotation_x(PI);
+    stage.add(square(), EmitterShape::Rectangle, Vec3::splat(3.0), two_sided).double_sided = true;
+    let pose = stage.scene.pose(0.0);
+    let lights = AreaLights::new(&stage.scene, &pose);
+    let ball = (Vec3::ZERO, 0.2);
+    let n = 100_000;
+    for light in 0..lights.len() as u32 {
+        for from in [Vec3::ZERO, Vec3::X * 0.2, -Vec3::X * 0.2, Vec3::new(0.1, -0.15, 0.08)] {
+            let mean = |sample: &dyn Fn([f32; 3]) -> Option<LightSample>| {
+                let worth = |s: LightSample| f64::from(s.to_light_world.y.max(0.0) / s.density_per_sr);
+                cube(n).filter_map(sample).map(worth).sum::<f64>() / f64::from(n)
+            };
+            let own = mean(&|u| lights.sample_light(light, from, u));
+            let shared = mean(&|u| {
+                let spot = lights.spot(light, ball, u).expect("far enough");
+                let seen = spot.seen_from(from)?;
+                assert!((from + seen.to_light_world * seen.distance_m - spot.position_world).length() < 1e-5);
+                Some(seen)
+            });
+            assert!(own > 0.0);
+            assert_near(shared as f32, own as f32, 0.003);
+        }
+    }
+    let near = (Vec3::ZERO, 0.25);
+    assert!(
+        cube(9).all(|u| lights.spot(1, near, u).is_none()),
+        "too near for their distance from each other"
+    );
+    let between = (Vec3::Y * 2.5, 0.3);
+    assert!(cube(9).all(|u| lights.spot(5, between, u).is_none()), "on both sides of what shines from both");
+    assert!(lights.spot(6, ball, [0.5; 3]).is_none(), "no such light");
+}
+
+#[test]
+fn a_pick_for_many_places_is_the_mean_of_theirs() {
+    let mut stage = Stage::new();
+    for (x, y) in [(-2.0, 1.0), (2.0, 1.0), (0.0, -1.0)] {
+        let world = Affine3A::from_translation(Vec3::new(x, y, 0.0)) * Affine3A::from_scale(Vec3::splat(0.3));
+        stage.add(octahedron(), EmitterShape::Sphere, Vec3::splat(5.0), world);
+    }
+    let pose = stage.scene.pose(0.0);
+    let lights = AreaLights::new(&stage.scene, &pose);
+    // The last is in the dark.
+    let places = [(Vec3::ZERO, Vec3::Y), (Vec3::X * 1.5, Vec3::Y), (Vec3::X * -5.0, -Vec3::X)];
+    for pick in PICKS {
+        let mut among = Chooser::new(pick);
+        among.aim_among(&lights, places);
+        let mut own = Chooser::new(pick);
+        for light in 0..lights.len() {
+            let mean = |own: &mut Chooser| {
+                let of = |(position, normal)| {
+                    own.aim(&lights, position, normal);
+                    own.probability(&lights, light)
+                };
+                // Places to which nothing can come have no say.
+                let lit = if pick == Pick::Fluence { &places[..2] } else { &places[..] };
+                lit.iter().copied().map(of).sum::<f32>() / lit.len() as f32
+            };
+            let (found, exact) = (among.probability(&lights, light), mean(&mut own));
+            assert!((found - exact).abs() < 1e-5, "{pick:?}, light {light}: {found}, {exact}");
+        }
+    }
+}

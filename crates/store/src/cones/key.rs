@@ -80,6 +80,12 @@ impl BlockKey {
         })
     }
 
+    /// The same for all blocks of a square of 2^`up` × 2^`up` on a chart (`up` 0 … 16, more counts as that).
+    pub fn square(self, up: u8) -> BlockKey {
+        let up = up.min(16);
+        BlockKey { x: self.x >> up, y: self.y >> up, ..self }
+    }
+
     /// The texel at x, y of the level, in the same chart (and slab) as this block.
     pub(super) fn texel_at(self, x: i32, y: i32) -> TexelKey {
         let texel = (y.rem_euclid(BLOCK_SIDE) * BLOCK_SIDE + x.rem_euclid(BLOCK_SIDE)) as u8;

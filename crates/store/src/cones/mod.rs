@@ -19,8 +19,8 @@ pub use bounding::{
     BoundingCone, BoundingEntry, BoundingParams, Cycle, MOST_BOUNDING_CONES, Probe, reduction,
 };
 pub use cache::{
-    CacheCounts, CacheParams, ConeCache, EntryId, EntrySite, LookUp, PixelPlace, QueuedTexel, Reader, Reads,
-    Requests, TexelPlace, Touch, UpdateQueue, View,
+    CacheCounts, CacheParams, ConeCache, EntryId, EntrySite, LookUp, PixelPlace, QueuedBlock, QueuedTexel,
+    Reader, Reads, Requests, TexelPlace, Touch, UpdateQueue, View,
 };
 pub use charting::{ChartPlace, Charting};
 pub use entry::{ConeEntry, ConeError, ConeSample, MOST_ENERGY, luminance};

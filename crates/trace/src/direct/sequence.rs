@@ -7,14 +7,16 @@ use crate::sampling::{hash, unit_interval};
 pub enum Sequence {
     /// Not at all.
     Random,
-    /// Points of a lattice that fills the cube evenly however many there are, moved by a random offset of each place (\[Roberts2018\]). The index
+    /// Points of a lattice that fills the cube, and each of its sides, evenly however many there are, moved by a random offset of each place. The index
     /// goes on over frames, so that what frames average to gets better as more samples of one frame would.
     #[default]
     Lattice,
 }
 
-/// Reciprocal powers of the root of x⁴ = x + 1, the golden ratio's relative in three dimensions, in units of 2⁻⁶⁴.
-const LATTICE: [u64; 3] = [0xd1b5_4a32_d192_ed03, 0xabc9_8388_fb8f_ac02, 0x8cb9_2ba7_2f3d_8dd7];
+/// Steps of the lattice along its dimensions, in units of 2⁻⁶⁴: 0.70758825, 0.77398938, 0.63920735. Found by a search for those of the least discrepancy
+/// (wrapped around, L2) of 3 to 4096 points in every projection. Powers of the root of x⁴ = x + 1 (\[Roberts2018\]) are as good where three dimensions count,
+/// but thrice their second is 2.013: 24 points have three places there, and cover a third of the range.
+const LATTICE: [u64; 3] = [0xb524_80fa_ca8b_f001, 0xc624_2b11_d965_0001, 0xa3a3_17b3_b838_d001];
 
 /// The numbers of one place in one frame.
 #[derive(Clone, Copy, Debug)]
@@ -54,4 +56,24 @@ impl Draws {
 pub(super) fn stream(seed: u64, site: u64, frame: u64, purpose: u32) -> u64 {
     let frame_seed = u64::from(hash(seed, frame, purpose)) << 32 | u64::from(hash(!seed, frame, purpose));
     u64::from(hash(frame_seed, site, 0)) << 32 | u64::from(hash(frame_seed, site, 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Along every dimension no gap is much wider than the mean, however many points there are.
+    #[test]
+    fn a_lattice_fills_its_sides() {
+        let draws = Draws::new(Sequence::Lattice, 3, 5, 0, 1);
+        for n in [2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 128, 256, 512, 1024, 4096] {
+            for d in 0..3 {
+                let mut places: Vec<f32> = (0..n).map(|i| draws.at(i)[d]).collect();
+                places.sort_by(f32::total_cmp);
+                let around = places[0] + 1.0 - places[n as usize - 1];
+                let gap = places.windows(2).map(|pair| pair[1] - pair[0]).fold(around, f32::max);
+                assert!(gap * (n as f32) < 3.0, "{n} points, dimension {d}: {}", gap * n as f32);
+            }
+        }
+    }
 }

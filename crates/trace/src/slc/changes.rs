@@ -216,7 +216,7 @@ impl Change {
         let moved = place.position_before_world != place.position_world
             || place.normal_shading_before_world != place.normal_shading_world;
         for (light, changed) in changes.lights.iter().enumerate() {
-            if !changed && !moved {
+            if !changed && !moved || !entry.holds_alone(light as u32) {
                 continue;
             }
             let Some(then) = changes.before.bounds(light) else { continue };

@@ -13,15 +13,18 @@ mod paper;
 mod places;
 #[cfg(test)]
 mod tests;
+mod together;
+#[cfg(test)]
+mod together_tests;
 mod visibility;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use dapple_scene::area_lights::{AreaLights, Chooser, Pick};
+use dapple_scene::area_lights::{AreaLights, Chooser, LightSample, Pick};
 use dapple_scene::glam::Vec3;
 use dapple_store::cones::{
-    BLOCK_SIDE, ConeCache, ConeEntry, ConeSample, EntryId, HiddenSample, MomentEntry, MomentParams, Touch,
-    UpdateQueue, luminance,
+    BLOCK_SIDE, BLOCK_TEXELS, ConeCache, ConeEntry, ConeSample, EntryId, HiddenSample, MomentEntry,
+    MomentParams, QueuedTexel, Touch, UpdateQueue, luminance,
 };
 
 use crate::bvh::{Tracer, offset_origin};
@@ -30,6 +33,7 @@ use crate::sampling::hash;
 pub use changes::{Changes, Moment};
 pub use paper::PaperParams;
 pub use places::{EntryPlace, EntryPlaces};
+use together::{Group, Hands, SQUARE};
 pub use visibility::{
     LightTracker, TrackerParams, VisibilityCounts, VisibilityParams, retrace_visibility, trace_visibility,
 };
@@ -57,6 +61,9 @@ pub struct SlcParams {
     pub pick: Pick,
     /// Where samples lie, default a lattice that goes on through the life of an entry.
     pub sequence: Sequence,
+    /// Entries of a block share places on lights, and the rays from these, with those that stand so many texels beside them, 1 … 8: as many as that squared
+    /// have places of their own. Default 2: the four that a pixel blends. 0: none share.
+    pub together: u32,
     /// Whether cones of lights that moved are turned with them, before they are updated. Default.
     pub re_aim: bool,
     /// Seed of the samples, default 0.
@@ -73,6 +80,7 @@ impl Default for SlcParams {
             samples: 3,
             pick: Pick::Fluence,
             sequence: Sequence::Lattice,
+            together: 2,
             re_aim: true,
             seed: 0,
         }
@@ -132,58 +140,82 @@ impl Update for MomentEntry {
         let SlcParams { pick, sequence, seed, .. } = *params;
         let source = Source { pick, sequence, seed, with_cosine: true };
         let frame = cache.frame();
-        let updated = cache.update(queue, |index, texel, entry| {
-            let (Some(place), false) = (places.get(index), lights.is_empty()) else { return Touch::Nothing };
-            let mut touch = Touch::Nothing;
-            let change = changes.of(place, texel.instance);
-            let site = site_of(texel.instance, texel.place.triangle, texel.place.barycentrics);
-            if texel.moved {
-                // What it knows is of a place beside it.
-                ConeEntry::cut_confidence(entry, KEPT as u16);
-                touch = Touch::Changed;
+        let updated = cache.update_blocks(queue, SQUARE, |blocks| {
+            if lights.is_empty() {
+                return;
             }
-            if let Some(kept) = (KEPT as u32).checked_div(changes.missed(texel.absent)) {
-                // What it knows may be of another time.
-                ConeEntry::cut_confidence(entry, kept as u16);
-                touch = Touch::Changed;
-            }
-            let turn = turn_of(texel.id);
-            // When it is its turn in any case.
-            let phase = frame.wrapping_add(turn).wrapping_add((site as u32) << 1);
-            let mut count = quiet_samples(entry, params, phase);
-            if change.share > LEAST_SHARE {
-                changed.fetch_add(1, Ordering::Relaxed);
-                touch = Touch::Changed;
-                let root = change.share.sqrt();
-                if params.re_aim {
-                    change.re_aim(entry, place, changes);
+            let group = Group::of(&blocks[0].key, params.together);
+            let mut counts = vec![[0; BLOCK_TEXELS]; blocks.len()];
+            for (block, counts) in blocks.iter_mut().zip(&mut counts) {
+                for (i, count) in counts.iter_mut().enumerate().take(block.texels.len()) {
+                    let Some(place) = places.get(block.first + i) else { continue };
+                    let texel = &block.texels[i];
+                    let turns = (frame, turn_of(texel.id), group.turn(texel.id));
+                    let (touch, wanted) = prepare(block.entry(i), texel, place, changes, params, turns);
+                    changed.fetch_add(u64::from(wanted.is_changed), Ordering::Relaxed);
+                    (block.touched[i], *count) = (touch, wanted.count);
                 }
-                let kept = if params.re_aim && !change.hidden { KEPT_RE_AIMED } else { KEPT };
-                // Of a light that was not there, what the entry knows says nothing.
-                let kept = if change.new > LEAST_SHARE { kept.min(1.0 / change.new) } else { kept / root };
-                entry.cut_confidence(kept.clamp(1.0, 4095.0) as u16);
-                let follows = params.re_aim && change.new <= LEAST_SHARE && !texel.moved && !texel.is_new;
-                if follows && is_plain(entry) && !turn.wrapping_add(frame).is_multiple_of(2) {
-                    return touch;
-                }
-                let most = params.changed_samples;
-                count = count.min(most).max(libm::ceilf(most as f32 * root) as u32);
             }
-            let count = count.min(MAX_SAMPLES);
-            if count == 0 {
-                return touch;
-            }
-            let indices = (0..count).map(|i| entry.taken().wrapping_add(i));
-            let drawn = take_samples(tracer, lights, place, &source, site, indices);
-            rays.fetch_add(drawn.rays, Ordering::Relaxed);
-            let picked = |light| drawn.chooser.probability(lights, light as usize);
-            entry.update_seen(&drawn.samples, &drawn.hidden, count, picked, &params.moment);
-            Touch::Updated
+            let hands = Hands { places, tracer, lights, source: &source, params };
+            rays.fetch_add(together::update(blocks, &counts, group, &hands), Ordering::Relaxed);
         });
         // A queue of another frame is the caller's mistake, and updates nothing.
         let updated = updated.unwrap_or(0);
         SlcCounts { updated, rays: rays.into_inner(), changed: changed.into_inner() }
     }
+}
+
+/// Samples that an entry takes.
+struct Wanted {
+    count: u32,
+    /// Whether that is since something changed.
+    is_changed: bool,
+}
+
+/// What a change of the scene does to an entry before it takes samples, and how many it takes then. `turns`: the frame, whose turn of two the entry's
+/// is, and when it is that of its group.
+fn prepare(
+    entry: &mut MomentEntry,
+    texel: &QueuedTexel,
+    place: &EntryPlace,
+    changes: &Changes<'_>,
+    params: &SlcParams,
+    (frame, turn, group_turn): (u32, u32, u32),
+) -> (Touch, Wanted) {
+    let mut touch = Touch::Nothing;
+    let change = changes.of(place, texel.instance);
+    if texel.moved {
+        // What it knows is of a place beside it.
+        ConeEntry::cut_confidence(entry, KEPT as u16);
+        touch = Touch::Changed;
+    }
+    if let Some(kept) = (KEPT as u32).checked_div(changes.missed(texel.absent)) {
+        // What it knows may be of another time.
+        ConeEntry::cut_confidence(entry, kept as u16);
+        touch = Touch::Changed;
+    }
+    // When it is its turn in any case.
+    let phase = frame.wrapping_add(turn).wrapping_add(group_turn);
+    let mut count = quiet_samples(entry, params, phase);
+    let is_changed = change.share > LEAST_SHARE;
+    if is_changed {
+        touch = Touch::Changed;
+        let root = change.share.sqrt();
+        if params.re_aim {
+            change.re_aim(entry, place, changes);
+        }
+        let kept = if params.re_aim && !change.hidden { KEPT_RE_AIMED } else { KEPT };
+        // Of a light that was not there, what the entry knows says nothing.
+        let kept = if change.new > LEAST_SHARE { kept.min(1.0 / change.new) } else { kept / root };
+        entry.cut_confidence(kept.clamp(1.0, 4095.0) as u16);
+        let follows = params.re_aim && change.new <= LEAST_SHARE && !texel.moved && !texel.is_new;
+        if follows && is_plain(entry) && !turn.wrapping_add(frame).is_multiple_of(2) {
+            return (touch, Wanted { count: 0, is_changed });
+        }
+        let most = params.changed_samples;
+        count = count.min(most).max(libm::ceilf(most as f32 * root) as u32);
+    }
+    (touch, Wanted { count: count.min(MAX_SAMPLES), is_changed })
 }
 
 /// Part of a light from which on all of it is seen.
@@ -240,55 +272,68 @@ struct Drawn {
     samples: Vec<ConeSample>,
     /// Those that something stood in the way of.
     hidden: Vec<HiddenSample>,
-    /// What picked their lights.
-    chooser: Chooser,
     /// How many rays were needed.
     rays: u64,
 }
 
-/// Sends rays to lights.
+/// Where a sample of light goes.
+enum Fate {
+    /// To the place, if nothing is in the way.
+    Open(ConeSample),
+    /// The surface itself is in the way of its bumps.
+    Hidden(HiddenSample),
+}
+
+/// What a place makes of a sample; `None` if it faces away from it.
+fn judge(sample: &LightSample, normal: Vec3, faced: Vec3, with_cosine: bool) -> Option<Fate> {
+    let LightSample { light, to_light_world: direction, .. } = *sample;
+    let cosine = faced.dot(direction);
+    if cosine <= 0.0 {
+        return None;
+    }
+    let factor = if with_cosine { cosine } else { 1.0 };
+    let value = sample.radiance * (factor / sample.density_per_sr);
+    Some(if normal.dot(direction) <= 0.0 {
+        Fate::Hidden(HiddenSample { light, value: luminance(value) })
+    } else {
+        Fate::Open(ConeSample { direction, value, light, cosine: factor })
+    })
+}
+
+/// The normal that light is by the cosine to. Light by the cosine to a surface that bumps turn is what the pixels there reflect; by that to the triangle under
+/// it, lights that it hardly faces would have next to no part in a cone, and bumps that face them would lack their light.
+fn faced(place: &EntryPlace, source: &Source) -> Vec3 {
+    if source.with_cosine { place.normal_shading_world } else { place.normal_world }
+}
+
+/// Sends rays to lights from one place, which `chooser` is aimed at. Places on lights are chosen from where rays leave ([`offset_origin`]), so that a ray
+/// ends where its sample lies: moved by that little, it would end behind the face of a light that is near, or seen at a grazing angle.
 fn take_samples(
     tracer: &Tracer,
     lights: &AreaLights<'_>,
+    chooser: &Chooser,
     place: &EntryPlace,
     source: &Source,
     site: u64,
     indices: impl ExactSizeIterator<Item = u32>,
 ) -> Drawn {
     let normal = place.normal_world;
-    // Places on lights are chosen from where rays leave, so that a ray ends where its sample lies: moved by that little, it would end behind the
-    // face of a light that is near, or seen at a grazing angle.
     let origin = offset_origin(place.position_world, normal);
-    // Light by the cosine to a surface that bumps turn is what the pixels there reflect; by that to the triangle under it, lights that it
-    // hardly faces would have next to no part in a cone, and bumps that face them would lack their light.
-    let faced = if source.with_cosine { place.normal_shading_world } else { normal };
     let draws = Draws::new(source.sequence, source.seed, site, 0, 1);
-    let mut chooser = Chooser::new(source.pick);
-    chooser.aim(lights, origin, faced);
     let mut samples = Vec::with_capacity(indices.len());
     let mut reaches: Vec<Vec3> = Vec::with_capacity(indices.len());
     let mut hidden = Vec::new();
     for i in indices {
-        let Some(sample) = lights.sample(&chooser, origin, draws.at(i)) else {
+        let Some(sample) = lights.sample(chooser, origin, draws.at(i)) else {
             continue;
         };
-        let cosine = faced.dot(sample.to_light_world);
-        if cosine <= 0.0 {
-            continue;
-        }
-        let factor = if source.with_cosine { cosine } else { 1.0 };
-        let value = sample.radiance * (factor / sample.density_per_sr);
-        if normal.dot(sample.to_light_world) <= 0.0 {
-            // The surface itself is in the way of its bumps.
-            hidden.push(HiddenSample { light: sample.light, value: luminance(value) });
-        } else {
-            samples.push(ConeSample {
-                direction: sample.to_light_world,
-                value,
-                light: sample.light,
-                cosine: factor,
-            });
-            reaches.push(sample.reach());
+        match judge(&sample, normal, faced(place, source), source.with_cosine) {
+            Some(Fate::Open(open)) => {
+                samples.push(open);
+                reaches.push(sample.reach());
+            }
+            Some(Fate::Hidden(sample)) => hidden.push(sample),
+            None => {}
         }
     }
     let blocked = tracer.occlusion(origin, &reaches, 1.0);
@@ -301,5 +346,13 @@ fn take_samples(
         }
         !is_hidden
     });
-    Drawn { samples, hidden, chooser, rays: reaches.len() as u64 }
+    Drawn { samples, hidden, rays: reaches.len() as u64 }
+}
+
+/// A chooser for one place.
+fn chooser_for(lights: &AreaLights<'_>, place: &EntryPlace, source: &Source) -> Chooser {
+    let mut chooser = Chooser::new(source.pick);
+    let origin = offset_origin(place.position_world, place.normal_world);
+    chooser.aim(lights, origin, faced(place, source));
+    chooser
 }

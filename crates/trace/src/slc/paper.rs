@@ -6,7 +6,9 @@ use dapple_scene::area_lights::{self, AreaLights, Pick};
 use dapple_scene::glam::Vec3;
 use dapple_store::cones::{BoundingEntry, BoundingParams, ConeCache, Probe, UpdateQueue};
 
-use super::{Changes, EntryPlaces, MAX_SAMPLES, SlcCounts, Source, Update, site_of, take_samples};
+use super::{
+    Changes, EntryPlaces, MAX_SAMPLES, SlcCounts, Source, Update, chooser_for, site_of, take_samples,
+};
 use crate::bvh::{Tracer, offset_origin};
 use crate::direct::Sequence;
 use crate::sampling::{hash, unit_interval};
@@ -70,7 +72,8 @@ impl Update for BoundingEntry {
             let site = site_of(texel.instance, texel.place.triangle, texel.place.barycentrics);
             let taken = entry.taken();
             let indices = (0..count).map(|i| taken.wrapping_add(i));
-            let drawn = take_samples(tracer, lights, place, &source, site, indices);
+            let chooser = chooser_for(lights, place, &source);
+            let drawn = take_samples(tracer, lights, &chooser, place, &source, site, indices);
             let mut traced = drawn.rays;
             let mut cycle = entry.update(&drawn.samples, count, &params.bounding);
             if params.probes {

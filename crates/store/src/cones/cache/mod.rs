@@ -119,6 +119,46 @@ impl From<bool> for Touch {
     }
 }
 
+/// The texels of one block that are in a frame's queue, with their entries.
+#[derive(Debug)]
+pub struct QueuedBlock<'a, E> {
+    /// Which block.
+    pub key: BlockKey,
+    /// Index in the queue of the first of its texels; the others follow.
+    pub first: usize,
+    /// Its texels, in order of their entries' numbers.
+    pub texels: &'a [QueuedTexel],
+    /// What was done to the entry of each, to be set; at first nothing.
+    pub touched: [Touch; BLOCK_TEXELS],
+    entries: &'a mut [E; BLOCK_TEXELS],
+    head: &'a mut Head,
+}
+
+impl<E: ConeEntry> QueuedBlock<'_, E> {
+    /// The entry of the texel with that index in `texels`.
+    #[inline]
+    pub fn entry(&mut self, index: usize) -> &mut E {
+        &mut self.entries[self.texels[index].id.texel()]
+    }
+
+    /// Keeps what was done; returns how many were updated.
+    fn note(&mut self, clock: u64) -> u64 {
+        let mut done = 0;
+        for (queued, touch) in self.texels.iter().zip(self.touched) {
+            let texel = queued.id.texel();
+            if touch == Touch::Updated {
+                self.head.own |= 1 << texel;
+                done += 1;
+            }
+            if touch != Touch::Nothing {
+                self.head.note_samples(texel, &self.entries[texel]);
+                self.head.changed = clock;
+            }
+        }
+        done
+    }
+}
+
 /// What is looked at often of a block.
 #[derive(Clone, Copy, Debug)]
 struct Head {
@@ -272,30 +312,48 @@ impl<E: ConeEntry> ConeCache<E> {
         F: Fn(usize, &QueuedTexel, &mut E) -> T + Sync,
         T: Into<Touch>,
     {
+        self.update_blocks(queue, 0, |blocks| {
+            for block in blocks {
+                for i in 0..block.texels.len() {
+                    let texel = &block.texels[i];
+                    block.touched[i] = update(block.first + i, texel, block.entry(i)).into();
+                }
+            }
+        })
+    }
+
+    /// As [`ConeCache::update`], for blocks that lie beside each other on a chart at once: `update` has those of a square of 2^`up` × 2^`up` blocks
+    /// (`up` 0 … 16, more counts as that) that have texels in the queue, in an order that the queue alone tells.
+    ///
+    /// # Errors
+    ///
+    /// The queue is of another frame.
+    pub fn update_blocks<F>(&mut self, queue: &UpdateQueue, up: u8, update: F) -> Result<u64, ConeError>
+    where
+        F: Fn(&mut [QueuedBlock<'_, E>]) + Sync,
+    {
         if queue.frame != self.frame {
             let (name, rule) = ("frame of the queue", "it must be the cache's last one");
             return Err(ConeError::BadParameter { name, value: f64::from(queue.frame), rule });
         }
         self.clock += 1;
         let clock = self.clock;
-        let done = self.heads.par_iter_mut().zip(&mut self.bodies).map(|(head, body)| {
-            let (mut done, mut touched) = (0, false);
-            for (index, texel) in (head.first_queued as usize..).zip(bits(head.wanted)) {
-                let Some(queued) = queue.texels.get(index) else { break };
-                let touch = update(index, queued, &mut body.entries[texel]).into();
-                if touch == Touch::Updated {
-                    head.own |= 1 << texel;
-                    done += 1;
-                }
-                if touch != Touch::Nothing {
-                    head.note_samples(texel, &body.entries[texel]);
-                    touched = true;
-                }
-            }
-            if touched {
-                head.changed = clock;
-            }
-            done
+        let wanted = self.heads.iter_mut().zip(&mut self.bodies).filter(|(head, _)| head.wanted != 0);
+        let mut blocks: Vec<QueuedBlock<'_, E>> = wanted
+            .filter_map(|(head, body)| {
+                let first = head.first_queued as usize;
+                let texels = queue.texels.get(first..first + head.wanted.count_ones() as usize)?;
+                let touched = [Touch::Nothing; BLOCK_TEXELS];
+                Some(QueuedBlock { key: head.key, first, texels, touched, entries: &mut body.entries, head })
+            })
+            .collect();
+        let square = |block: &QueuedBlock<'_, E>| block.key.square(up);
+        blocks.par_sort_unstable_by_key(|block| (square(block), block.first));
+        let squares: Vec<&mut [QueuedBlock<'_, E>]> =
+            blocks.chunk_by_mut(|a, b| square(a) == square(b)).collect();
+        let done = squares.into_par_iter().map(|blocks| {
+            update(blocks);
+            blocks.iter_mut().map(|block| block.note(clock)).sum::<u64>()
         });
         Ok(done.sum())
     }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::super::entry::{GONE, angle_between, luminance};
+use super::super::entry::{GONE, luminance};
 use super::{MOST_MOMENT_CONES, MomentCone, MomentEntry, MomentParams};
 
 /// Cones are not taken to be narrower than this, radians, when it is asked what lies inside: samples of a light
@@ -19,8 +19,10 @@ impl MomentEntry {
             if params.tagged && !cone.lights.may_hold(light) {
                 continue;
             }
-            let angle = angle_between(cone.direction(), direction);
-            if angle <= params.inside * cone.angle().max(LEAST_ANGLE) && inside.is_none_or(|(a, _)| angle < a)
+            let (axis, cos_angle) = cone.axis();
+            let angle = quick_angle(axis.dot(direction));
+            if angle <= params.inside * quick_angle(cos_angle).max(LEAST_ANGLE)
+                && inside.is_none_or(|(a, _)| angle < a)
             {
                 inside = Some((angle, i));
             }
@@ -70,7 +72,7 @@ impl MomentEntry {
             let direction = cone.direction();
             // Of its own light, if there is one: what is seen of the other's would look like more.
             let away = |other: &MomentCone| {
-                angle_between(other.direction(), direction)
+                quick_angle(other.direction().dot(direction))
                     + if other.lights == cone.lights { 0.0 } else { 4.0 }
             };
             let heir = self
@@ -140,8 +142,16 @@ impl MomentEntry {
     }
 }
 
+/// Angle by its cosine, radians, to 7 × 10⁻⁵ and five thousandths of a percent ([Abramowitz1964] 4.4.45): good enough to say which cone is nearer.
+#[inline]
+fn quick_angle(cosine: f32) -> f32 {
+    let x = cosine.abs().min(1.0);
+    let angle = (1.0 - x).sqrt() * (1.570_728_8 + x * (-0.212_114_4 + x * (0.074_261 - x * 0.018_729_3)));
+    if cosine >= 0.0 { angle } else { std::f32::consts::PI - angle }
+}
+
 /// Angle between axes, radians, and more for cones without a common light.
 fn distance(a: &MomentCone, b: &MomentCone, params: &MomentParams) -> f32 {
     let apart = params.tagged && !a.lights.meets(b.lights);
-    angle_between(a.direction(), b.direction()) + if apart { params.apart_rad } else { 0.0 }
+    quick_angle(a.direction().dot(b.direction())) + if apart { params.apart_rad } else { 0.0 }
 }

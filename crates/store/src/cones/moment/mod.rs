@@ -293,7 +293,7 @@ impl MomentEntry {
         for cone in &mut self.cones[..usize::from(self.count)] {
             cone.scale(kept);
         }
-        let before = self.cones.map(|cone| cone.lights);
+        let before: [LightSet; MOST_MOMENT_CONES] = std::array::from_fn(|i| self.cones[i].lights);
         // Those that nothing is left of take no samples in: they have no direction, and are of lights that were.
         self.drop_dark();
         for sample in samples {
@@ -357,6 +357,11 @@ impl MomentEntry {
         self.samples = self.samples.min(most);
     }
 
+    /// Whether it has a cone of this light alone.
+    pub fn holds_alone(&self, light: u32) -> bool {
+        self.cones().iter().any(|cone| cone.lights.single() == Some(light))
+    }
+
     /// Whether a light may have a part in it.
     pub fn may_hold(&self, light: u32) -> bool {
         self.cones().iter().any(|cone| cone.lights.may_hold(light))
@@ -379,8 +384,10 @@ impl MomentEntry {
             if cone.lights.single() != Some(aim.light) {
                 continue;
             }
-            let direction = turn(cone.direction(), from, to);
-            let angle = (cone.angle() * aim.size_ratio).min(std::f32::consts::PI);
+            let (axis, cos_angle) = cone.axis();
+            let direction = turn(axis, from, to);
+            // The solid angle goes with the square of the size.
+            let cos_angle = 1.0 - ((1.0 - cos_angle) * aim.size_ratio * aim.size_ratio).min(2.0);
             let fluence = (cone.fluence * aim.fluence_ratio).min(MOST_ENERGY);
             let most = fluence * aim.most_cosine.min(1.0);
             let factor = aim.energy_ratio.min(most / luminance(cone.energy).max(LEAST_ENERGY));
@@ -390,7 +397,7 @@ impl MomentEntry {
             *cone = MomentCone {
                 hidden,
                 seen: cone.seen,
-                ..MomentCone::from_cap(direction, libm::cosf(angle), energy, cosine, cone.lights)
+                ..MomentCone::from_cap(direction, cos_angle, energy, cosine, cone.lights)
             };
             turned += 1;
         }

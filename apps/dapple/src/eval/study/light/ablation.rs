@@ -67,8 +67,11 @@ fn variants() -> Vec<(String, Technique)> {
         all.push((format!("slc, bias {bias}"), Technique::cones().with_texels(bias)));
     }
     for bias in [1.0, 2.0, 4.0] {
-        let look_up = LookUp { bias, blend: false };
-        all.push((format!("slc, one texel, bias {bias}"), ours(|c| c.shading.look_up = look_up)));
+        let one = Technique::cones().without_blending().with_texels(bias);
+        all.push((format!("slc, one texel, bias {bias}"), one));
+    }
+    for (together, whose) in [(0, "of its own"), (1, "of all"), (4, "of every fourth")] {
+        all.push((format!("slc, places {whose}"), ours(|c| c.params.together = together)));
     }
     for (samples, updates, then) in [(8, 8, 1), (16, 1, 2), (16, 4, 3)] {
         let young = |c: &mut OurCones| {
