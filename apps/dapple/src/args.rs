@@ -212,7 +212,8 @@ pub(crate) struct RenderArgs {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct DirectLightArgs {
     /// Light surfaces by what emits, by rt-N (N rays a sample), ris, restir-di, slc (light cones; slc-quick with coarser ones
-    /// for a quarter to a half of the rays; slc-card has a graphics card shade them) or slc-paper; with -power behind it lights are picked as the paper does. No sun is made up then. Without it what emits is seen, but lights nothing.
+    /// for a quarter to a half of the rays; slc-fast for still less, unblended; slc-fine with fine ones, for what stands still;
+    /// slc-card has a graphics card shade them) or slc-paper; with -power behind it lights are picked as the paper does. No sun is made up then. Without it what emits is seen, but lights nothing.
     #[arg(long, value_name = "METHOD")]
     pub(crate) direct_light: Option<DirectLight>,
     /// Steps at 15 Hz that lead to the picture, for methods that remember (restir-di and those of cones).

@@ -222,7 +222,7 @@ fn area_lights_light_a_picture() {
         picture.iter().map(|v| f64::from(*v)).sum::<f64>() / picture.len() as f64
     };
     let rays = render("rays.png", &["--direct-light", "rt-64"]);
-    for method in ["slc", "slc-power", "slc-quick", "slc-paper", "ris", "restir-di"] {
+    for method in ["slc", "slc-power", "slc-fast", "slc-quick", "slc-fine", "slc-paper", "ris", "restir-di"] {
         let found = render("other.png", &["--direct-light", method]);
         assert!((found - rays).abs() < 0.1 * rays, "{method}: {found}, by rays {rays}");
     }

@@ -100,13 +100,17 @@ fn ways() -> Vec<Lit> {
     let shading = SlcShading::default();
     // Nothing is blended that would have other places on lights.
     let alone = SlcParams { together: 1, ..SlcParams::default() };
+    let [half, most] = [0.5, 1.7].map(|bias| LookUp { bias, ..near });
+    let few = SlcParams { first_updates: 1, samples: 2, ..SlcParams::default() };
     vec![
         Lit::new("slc by cones alone", shading, false),
         Lit::new("slc", shading, true),
         Lit::new("slc, all cones", SlcShading { blending: Blending::Cones, ..shading }, true),
         sampled("slc, one texel", near, alone),
         Lit::new("slc, bias 2", SlcShading { look_up: wide, ..shading }, true),
-        sampled("slc, quick", wide, SlcParams { first_updates: 1, samples: 2, ..SlcParams::default() }),
+        sampled("slc, fast", most, SlcParams { changed_samples: 6, together: 1, ..few }),
+        sampled("slc, quick", wide, few),
+        sampled("slc, fine", half, alone),
     ]
 }
 

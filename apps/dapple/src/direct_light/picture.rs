@@ -34,9 +34,11 @@ impl FromStr for DirectLight {
             "slc-paper" => Technique::paper_cones(sampler),
             "slc" => Technique::cones().with_sampler(sampler),
             "slc-quick" => Technique::quick_cones().with_sampler(sampler),
+            "slc-fast" => Technique::fast_cones().with_sampler(sampler),
+            "slc-fine" => Technique::fine_cones().with_sampler(sampler),
             "slc-card" => Technique::cones().with_sampler(sampler).changed(|cones| cones.on_card = true),
             _ => Technique::rays(
-                rays.ok_or("write rt-N (N rays a sample, 1 to 65536), ris, restir-di, slc-paper, slc, slc-quick or slc-card, each also with -power")?,
+                rays.ok_or("write rt-N (N rays a sample, 1 to 65536), ris, restir-di, slc-paper, slc, slc-fast, slc-quick, slc-fine or slc-card, each also with -power")?,
                 sampler,
             ),
         };

@@ -78,7 +78,9 @@ impl Chooser {
         own.resize(lights.len(), 0.0);
         for (position, normal) in places_world {
             self.aim(lights, position, normal);
-            let Some(scale) = self.sums.last().filter(|sum| **sum > 0.0).map(|sum| 1.0 / sum) else {
+            let Some(scale) =
+                self.sums.last().filter(|sum| **sum > 0.0 && sum.is_finite()).map(|sum| 1.0 / sum)
+            else {
                 continue;
             };
             for (light, weight) in own.iter_mut().enumerate() {

@@ -78,11 +78,13 @@ impl LightSample {
     }
 }
 
+/// How long before a light rays end, or after it begin, in parts of the way.
+pub const BEFORE_LIGHT: f32 = 1.0 / 2048.0;
+
 /// A vector along which a ray has to be free that shall see a light so far away: [`LightSample::reach`].
 pub fn reach(to_light_world: Vec3, distance_m: f32) -> Vec3 {
-    const SHORTER: f32 = 1.0 - 1.0 / 2048.0;
     const FAR_M: f32 = 1e6;
-    to_light_world * (distance_m.min(FAR_M) * SHORTER)
+    to_light_world * (distance_m.min(FAR_M) * (1.0 - BEFORE_LIGHT))
 }
 
 /// Luminance of linear RGB with the primaries of sRGB (ITU-R BT.709).
@@ -235,7 +237,7 @@ impl<'a> AreaLights<'a> {
 
     /// A place on a light for receivers anywhere in a ball (centre and radius, metres), `u` as of [`AreaLights::sample`], the first the rest of the choice.
     /// All that any of them can see of the light has a density, so each may take it as a sample of its own: rays from it to all of them
-    /// start in one point. `None` where they had better choose for themselves: of the environment, of a sphere that is near for the ball's size, where
+    /// start in one point. Whether there is one goes by the first of `u` alone, so that receivers who then choose for themselves may move the others. `None` where they had better choose for themselves: of the environment, of a sphere that is near for the ball's size, where
     /// the ball lies on both sides of a light that shines from both.
     pub fn spot(&self, light: u32, (center, radius): (Vec3, f32), u: [f32; 3]) -> Option<LightSpot> {
         let l = self.lights.get(light as usize)?;

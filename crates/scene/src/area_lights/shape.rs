@@ -394,6 +394,8 @@ impl Shape {
         }
     }
 
+    /// Whether there is one goes by the first of `u` alone: who then chooses for themselves may move the others.
+    ///
     /// A place for all that may stand in a ball: for everyone in it, all that can be seen of the shape has a density. `None` where that would be of
     /// little use: the ball holds places on both sides of what shines from both, or is near a sphere for its size.
     pub(super) fn spot(&self, (from, spread): (Vec3, f32), two_sided: bool, u: [f32; 3]) -> Option<Spot> {
@@ -418,7 +420,7 @@ impl Shape {
         let (cos_seen, sin_aside) = (radius / (distance + spread), spread / distance);
         let [sin_seen, cos_aside] = [cos_seen, sin_aside].map(|x| (1.0 - x * x).max(0.0).sqrt());
         let height = 1.0 - (cos_seen * cos_aside - sin_seen * sin_aside);
-        let anywhere = (2.0 * sin_aside).clamp(LEAST_ANYWHERE, 0.5);
+        let anywhere = (2.0 * sin_aside).max(LEAST_ANYWHERE);
         let normal = if u[1] < anywhere {
             let below = height * u[1] / anywhere;
             around(offset / distance, below, u[2])

@@ -61,8 +61,8 @@ pub struct SlcParams {
     pub pick: Pick,
     /// Where samples lie, default a lattice that goes on through the life of an entry.
     pub sequence: Sequence,
-    /// Entries of a block share places on lights, and the rays from these, with those that stand so many texels beside them, 1 … 8: as many as that squared
-    /// have places of their own. Default 2: the four that a pixel blends. 0: none share.
+    /// Entries of a square of 16 × 16 texels share places on lights, and the bundles of rays from these, with every so-manyth in a row and a column: there are
+    /// `together`² sets of places. 1, 2, 4 or 8; others are rounded down to these. Default 2: the four that a pixel blends have different ones. 0: none share.
     pub together: u32,
     /// Whether cones of lights that moved are turned with them, before they are updated. Default.
     pub re_aim: bool,
@@ -194,8 +194,8 @@ fn prepare(
         ConeEntry::cut_confidence(entry, kept as u16);
         touch = Touch::Changed;
     }
-    // When it is its turn in any case.
-    let phase = frame.wrapping_add(turn).wrapping_add(group_turn);
+    // When it is its turn in any case: that of all of its group.
+    let phase = frame.wrapping_add(turn & 1).wrapping_add(group_turn);
     let mut count = quiet_samples(entry, params, phase);
     let is_changed = change.share > LEAST_SHARE;
     if is_changed {

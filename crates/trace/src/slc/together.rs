@@ -1,7 +1,7 @@
-//! Samples of the entries of a block, which share places on lights: rays of one place on a light to many entries beside each other are
+//! Samples of the entries of a square of blocks, which share places on lights: rays of one place on a light to many entries beside each other are
 //! hardly more work than a few to one.
 
-use dapple_scene::area_lights::{AreaLights, Chooser, LightSpot};
+use dapple_scene::area_lights::{AreaLights, BEFORE_LIGHT, Chooser, LightSpot};
 use dapple_scene::glam::Vec3;
 use dapple_store::cones::{
     BLOCK_SIDE, BLOCK_TEXELS, BlockKey, ConeSample, EntryId, HiddenSample, MomentEntry, QueuedBlock, Touch,
@@ -37,7 +37,7 @@ impl Group {
         let [level, slab] = [i64::from(square.level) as u64, i64::from(square.slab) as u64];
         let chart = u64::from(square.chart) << 32 | u64::from(square.instance);
         let half = |purpose| u64::from(hash(place ^ chart.rotate_left(17), slab << 8 ^ level, purpose));
-        let stride = (stride as usize).clamp(1, BLOCK_SIDE as usize);
+        let stride = 1 << stride.clamp(1, BLOCK_SIDE as u32).ilog2();
         Group { stride, site: half(0) << 32 | half(1) }
     }
 
@@ -50,7 +50,7 @@ impl Group {
 
     /// Names one of them.
     fn site(&self, index: usize) -> u64 {
-        self.site.rotate_left(index as u32) ^ index as u64
+        self.site.rotate_left(index as u32 % 64) ^ index as u64
     }
 
     /// Spreads over frames what groups do now and then.
@@ -75,26 +75,35 @@ pub(super) fn update(
     group: Group,
     hands: &Hands<'_>,
 ) -> u64 {
+    if counts.iter().flatten().all(|count| *count == 0) {
+        return 0;
+    }
     let mut rays = 0;
     let mut members: Vec<Member> = Vec::with_capacity(MOST_TOGETHER);
-    for index in 0..group.stride * group.stride {
+    let groups = group.stride * group.stride;
+    for index in 0..groups {
+        // What is too many for one bundle has other places.
+        let mut part = index;
         for (b, counts) in counts.iter().enumerate() {
             for (i, &count) in counts.iter().enumerate().take(blocks[b].texels.len()) {
-                if count == 0 || group.index(blocks[b].texels[i].id) != index {
+                let id = blocks[b].texels[i].id;
+                if count == 0 || group.index(id) != index {
                     continue;
                 }
                 let taken = blocks[b].entry(i).taken();
-                let name = blocks[b].texels[i].id.index() as u64;
+                let BlockKey { x, y, .. } = blocks[b].key;
+                let name = (y as u64 & 1) << 7 | (x as u64 & 1) << 6 | (id.index() % BLOCK_TEXELS) as u64;
                 let place = hands.places.get(blocks[b].first + i);
                 members.extend(
                     place.map(|place| Member::new([b, i], name, [count, taken], place, hands.source)),
                 );
                 if members.len() == MOST_TOGETHER {
-                    rays += serve(&mut members, blocks, group.site(index), hands);
+                    rays += serve(&mut members, blocks, group.site(part), hands);
+                    part += groups;
                 }
             }
         }
-        rays += serve(&mut members, blocks, group.site(index), hands);
+        rays += serve(&mut members, blocks, group.site(part), hands);
     }
     rays
 }
@@ -113,7 +122,8 @@ fn serve(
     for mut member in members.drain(..) {
         let [b, i] = member.at;
         let own;
-        let chooser = if let Some(shared) = &shared {
+        let chooser = if let Some((first, shared)) = &shared {
+            blocks[b].entry(i).skip_to(*first);
             shared
         } else {
             let Some(place) = places.get(blocks[b].first + i) else { continue };
@@ -175,19 +185,20 @@ impl Member {
     }
 }
 
-/// Takes samples of places on lights that all members share, each as many as it wants. Returns what picked their lights.
+/// Takes samples of places on lights that all members share, each as many as it wants. Returns the number of the first, which none of them had, and
+/// what picked their lights.
 pub(super) fn sample(
     tracer: &Tracer,
     lights: &AreaLights<'_>,
     source: &Source,
     site: u64,
     members: &mut [Member],
-) -> Chooser {
+) -> (u32, Chooser) {
     let mut chooser = Chooser::new(source.pick);
     chooser.aim_among(lights, members.iter().map(|member| (member.origin, member.faced)));
     let ball = ball_about(members);
     let draws = Draws::new(source.sequence, source.seed, site, 0, 1);
-    // All go on from where the oldest is: that the lattice is whole for.
+    // All go on from where the oldest is, and are moved there: who is younger would draw the same again when the oldest is not among them.
     let first = members.iter().map(|member| member.taken).max().unwrap_or(0);
     let most = members.iter().map(|member| member.count).max().unwrap_or(0);
     for member in &mut *members {
@@ -199,7 +210,7 @@ pub(super) fn sample(
         let u = [rest, v, w];
         let takers = members.iter_mut().filter(|member| member.count > i);
         if let Some(spot) = lights.spot(light, ball, u) {
-            share(tracer, source, &spot, probability, ball.0, takers);
+            share(tracer, source, &spot, probability, takers);
             continue;
         }
         for member in takers {
@@ -225,11 +236,8 @@ pub(super) fn sample(
             member.keep(sample, blocked[i / 64] >> (i % 64) & 1 == 1);
         }
     }
-    chooser
+    (first, chooser)
 }
-
-/// Length by which rays start before a light, in parts of the way to it: as much as `LightSample::reach` ends before it.
-const SHORTER: f32 = 1.0 / 2048.0;
 
 /// Gives a place on a light to all that want one, by rays from there.
 fn share<'a>(
@@ -237,20 +245,19 @@ fn share<'a>(
     source: &Source,
     spot: &LightSpot,
     probability: f32,
-    center: Vec3,
     takers: impl Iterator<Item = &'a mut Member>,
 ) {
     let mut open: [Option<(&mut Member, ConeSample)>; MOST_TOGETHER] = [const { None }; MOST_TOGETHER];
     let mut reaches = [Vec3::ZERO; MOST_TOGETHER];
-    let mut count = 0;
-    let before = spot.normal_world * (spot.position_world.distance(center) * SHORTER);
-    let from = offset_origin(spot.position_world + before, spot.normal_world);
+    let (mut count, mut nearest) = (0, f32::INFINITY);
     for member in takers {
         let Some(mut sample) = spot.seen_from(member.origin) else { continue };
         sample.density_per_sr *= probability;
+        let distance = sample.distance_m;
         match judge(&sample, member.normal, member.faced, source.with_cosine) {
             Some(Fate::Open(sample)) => {
-                reaches[count] = member.origin - from;
+                nearest = nearest.min(distance);
+                reaches[count] = member.origin;
                 open[count] = Some((member, sample));
                 count += 1;
             }
@@ -258,6 +265,12 @@ fn share<'a>(
             None => {}
         }
     }
+    if count == 0 {
+        return;
+    }
+    let before = spot.normal_world * (nearest * BEFORE_LIGHT);
+    let from = offset_origin(spot.position_world + before, spot.normal_world);
+    reaches[..count].iter_mut().for_each(|reach| *reach -= from);
     let blocked = tracer.occlusion(from, &reaches[..count], 1.0)[0];
     for (i, (member, sample)) in open.into_iter().flatten().enumerate() {
         member.keep(sample, blocked >> i & 1 == 1);

@@ -348,7 +348,10 @@ impl<E: ConeEntry> ConeCache<E> {
             })
             .collect();
         let square = |block: &QueuedBlock<'_, E>| block.key.square(up);
-        blocks.par_sort_unstable_by_key(|block| (square(block), block.first));
+        // Alone they are in order, each a square.
+        if up > 0 {
+            blocks.par_sort_unstable_by_key(|block| (square(block), block.first));
+        }
         let squares: Vec<&mut [QueuedBlock<'_, E>]> =
             blocks.chunk_by_mut(|a, b| square(a) == square(b)).collect();
         let done = squares.into_par_iter().map(|blocks| {

@@ -199,7 +199,7 @@ pub struct ReAim {
     pub fluence_ratio: f32,
     /// Largest cosine of its light to the entry's surface now, 0 … 1: more of its fluence is never irradiance. 1 where energies are fluence.
     pub most_cosine: f32,
-    /// Its apparent radius now ÷ before, ≥ 0.
+    /// Its apparent radius now ÷ before, ≥ 0: a cone's solid angle goes with the square.
     pub size_ratio: f32,
 }
 
@@ -350,6 +350,11 @@ impl MomentEntry {
         }
         let is_known = picked(light) * f32::from(self.samples) >= LEAST_TAKEN && all > 0.0;
         is_known.then(|| (luminance(cone.energy) / all).min(1.0))
+    }
+
+    /// Moves on in its sequence to sample `taken`, of a group of entries that take theirs together from there on.
+    pub fn skip_to(&mut self, taken: u32) {
+        self.taken = taken;
     }
 
     /// Brings C down to `most`, so that what comes next counts for more.

@@ -66,7 +66,7 @@ fn variants() -> Vec<(String, Technique)> {
     for bias in [0.5, 2.0, 4.0, 8.0] {
         all.push((format!("slc, bias {bias}"), Technique::cones().with_texels(bias)));
     }
-    for bias in [1.0, 2.0, 4.0] {
+    for bias in [0.5, 1.0, 2.0, 4.0] {
         let one = Technique::cones().without_blending().with_texels(bias);
         all.push((format!("slc, one texel, bias {bias}"), one));
     }

@@ -48,7 +48,9 @@ fn techniques() -> Vec<(&'static str, Technique)> {
         ("slc by cones alone", Technique::cones().changed(|cones| cones.shapes = false)),
         ("slc, one texel", Technique::cones().without_blending()),
         ("slc, texels twice as wide", Technique::cones().with_texels(2.0)),
+        ("slc-fast", Technique::fast_cones()),
         ("slc-quick", Technique::quick_cones()),
+        ("slc-fine", Technique::fine_cones()),
         ("slc", Technique::cones()),
     ]
 }

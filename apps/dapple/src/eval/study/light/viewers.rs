@@ -99,6 +99,7 @@ fn techniques() -> Vec<(&'static str, Technique)> {
         ("restir-di", Technique::Restir { sampler: Sampler::Power, unbiased: false }),
         ("slc-paper", Technique::paper_cones(Sampler::Power)),
         ("slc, texels twice as wide", Technique::cones().with_texels(2.0)),
+        ("slc-fast", Technique::fast_cones()),
         ("slc-quick", Technique::quick_cones()),
         ("slc", Technique::cones()),
     ]
