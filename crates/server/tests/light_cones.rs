@@ -119,19 +119,26 @@ fn sampled(name: &'static str, look_up: LookUp, params: SlcParams) -> Lit {
     Lit { params, ..Lit::new(name, SlcShading { look_up, ..SlcShading::default() }, true) }
 }
 
+/// What rays find where nothing has moved yet.
+fn still_truth(stage: &Stage, samples: u32) -> Vec<Vec3> {
+    let pose = stage.scene.pose(stage.time_s);
+    let tracer = Tracer::new(&stage.scene, &pose);
+    let now = Now { scene: &stage.scene, pose: &pose, tracer: &tracer, environment: None };
+    let params = DirectParams { samples, seed: 7, ..DirectParams::default() };
+    rays(&now, &stage.see(&now).points, &params)
+}
+
 /// Quality of each way after so many steps, and a table if asked.
 fn measure(
     stage: &Stage,
+    truth: &[Vec3],
     (steps, timed): (usize, usize),
-    samples: u32,
     seed: u64,
 ) -> Vec<(&'static str, [f64; 3])> {
     let pose = stage.scene.pose(stage.time_s);
     let tracer = Tracer::new(&stage.scene, &pose);
     let now = Now { scene: &stage.scene, pose: &pose, tracer: &tracer, environment: None };
     let seen = stage.see(&now);
-    let params = DirectParams { samples, seed: 7, ..DirectParams::default() };
-    let truth = rays(&now, &seen.points, &params);
     let mut ways = ways();
     ways.iter_mut().for_each(|lit| lit.params.seed = seed);
     for _ in 0..steps {
@@ -152,10 +159,10 @@ fn measure(
         println!("| {name} | {:.1} | {db:.2} | {ssim:.4} | {bias:+.2} |", rival_ms / median(ms));
     };
     for rival in rivals.iter().filter(|_| timed > 0) {
-        line(rival.name, &rival.ms, stage.quality(&truth, &rival.picture));
+        line(rival.name, &rival.ms, stage.quality(truth, &rival.picture));
     }
     let found = ways.into_iter().map(|lit| {
-        let quality = stage.quality(&truth, &lit.picture);
+        let quality = stage.quality(truth, &lit.picture);
         if timed > 0 {
             line(lit.name, &lit.ms, quality);
             let [places, caps] = &lit.stages;
@@ -176,12 +183,15 @@ fn measure(
 #[test]
 fn the_mean_light_of_a_village_is_that_of_rays() {
     let stage = Stage::new("village", 0.1, [96, 54]);
-    let runs = [0, 1, 2, 3].map(|seed| measure(&stage, (24, 0), 256, seed));
+    let truth = still_truth(&stage, 256);
+    let runs = [0, 1, 2, 3, 4, 5, 6, 7].map(|seed| measure(&stage, &truth, (24, 0), seed));
     for (way, (name, _)) in runs[0].iter().enumerate() {
         let bias = runs.iter().map(|run| run[way].1[2]).sum::<f64>() / runs.len() as f64;
+        // Of one run it may be off by that much more.
+        let most = runs.iter().map(|run| run[way].1[2].abs()).fold(0.0, f64::max);
         let least = runs.iter().map(|run| run[way].1[0]).fold(f64::INFINITY, f64::min);
         println!("{name}: {bias:+.2} %, {least:.2} dB");
-        assert!(bias.abs() < 4.0 && least > 22.0, "{name}: {bias} %, {least} dB");
+        assert!(bias.abs() < 4.0 && most < 9.0 && least > 22.0, "{name}: {bias} %, {most} %, {least} dB");
     }
 }
 
@@ -303,7 +313,8 @@ fn what_changed_out_of_sight_is_learnt_when_it_comes_back() {
 fn quality_and_time() {
     for name in ["atrium-lamps", "village", "hangar"] {
         println!("{name}\n| | times as quick | PSNR | SSIM | bias, % |");
-        measure(&Stage::new(name, 0.3, [320, 180]), (260, 5), 512, 0);
+        let stage = Stage::new(name, 0.3, [320, 180]);
+        measure(&stage, &still_truth(&stage, 512), (260, 5), 0);
     }
 }
 

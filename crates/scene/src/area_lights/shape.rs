@@ -358,6 +358,7 @@ impl Shape {
     }
 
     /// A place by area, wherever it is looked at from; `None` of balls, which are chosen from by what is seen of them.
+    #[inline(always)]
     pub(super) fn on_area(&self, u: [f32; 3]) -> Option<Spot> {
         match self {
             Shape::Nothing | Shape::Sphere { .. } => None,
@@ -456,6 +457,7 @@ pub(super) struct Spot {
 }
 
 impl Spot {
+    #[inline(always)]
     fn seen_from(self, from: Vec3, two_sided: bool) -> Option<Place> {
         let Spot { position, normal, area, emission } = self;
         let (direction, distance, density, side) = look(position, normal, area, two_sided, from)?;
@@ -464,6 +466,7 @@ impl Spot {
 }
 
 /// Direction to a place from elsewhere, distance, density by solid angle, and on which side of it that is (±1); `None` where its back is seen.
+#[inline(always)]
 pub(super) fn look(
     at: Vec3,
     normal: Vec3,
@@ -482,6 +485,7 @@ pub(super) fn look(
 }
 
 /// Uniform in the cone that a ball fills ([Shirley1996]); nothing from inside.
+#[inline(always)]
 fn sample_sphere(center: Vec3, radius: f32, from: Vec3, u: [f32; 2]) -> Option<Place> {
     let offset = center - from;
     let distance2 = offset.length_squared();
@@ -506,11 +510,13 @@ fn sample_sphere(center: Vec3, radius: f32, from: Vec3, u: [f32; 2]) -> Option<P
 }
 
 /// 1 − cos of an angle by its squared sine, without cancellation where it is small.
+#[inline(always)]
 fn cap_height(sin2: f32) -> f32 {
     sin2 / (1.0 + (1.0 - sin2).max(0.0).sqrt())
 }
 
 /// The unit vector whose angle to an axis has 1 − cos = `below`, turned about it.
+#[inline(always)]
 fn around(axis: Vec3, below: f32, turns: f32) -> Vec3 {
     let (cos, sin) = (1.0 - below, (below * (2.0 - below)).max(0.0).sqrt());
     let (s, c) = sin_cos_turns(turns);

@@ -14,8 +14,8 @@ pub enum Sequence {
 }
 
 /// Steps of the lattice along its dimensions, in units of 2⁻⁶⁴: 0.70758825, 0.77398938, 0.63920735. Found by a search for those of the least discrepancy
-/// (wrapped around, L2) of 3 to 4096 points in every projection. Powers of the root of x⁴ = x + 1 (\[Roberts2018\]) are as good where three dimensions count,
-/// but thrice their second is 2.013: 24 points have three places there, and cover a third of the range.
+/// (that of distances around the corners: `README.md`) of 3 to 4096 points in every projection. Powers of the root of x⁴ = x + 1 (\[Roberts2018\]) are as good where three dimensions count,
+/// but thrice their second is 2.013: 24 points lie there in three runs, with a quarter of the range open between any two.
 const LATTICE: [u64; 3] = [0xb524_80fa_ca8b_f001, 0xc624_2b11_d965_0001, 0xa3a3_17b3_b838_d001];
 
 /// The numbers of one place in one frame.

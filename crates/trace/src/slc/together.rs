@@ -150,7 +150,7 @@ pub(super) struct Member {
     /// Tells it from the others, always.
     name: u64,
     pub(super) count: u32,
-    taken: u32,
+    pub(super) taken: u32,
     /// Where rays end, above the surface.
     pub(super) origin: Vec3,
     normal: Vec3,

@@ -3,15 +3,15 @@
 use std::f32::consts::PI;
 
 use dapple_scene::EmitterShape;
-use dapple_scene::area_lights::AreaLights;
-use dapple_scene::glam::{Affine3A, Vec3};
+use dapple_scene::area_lights::{AreaLights, Environment};
+use dapple_scene::glam::{Affine3A, Mat3, Vec3};
 use dapple_scene::{Material, Pose, Scene};
 
 use super::together::{Member, sample};
 use super::*;
 use crate::test_support::{quad, scene as placed, sphere};
 
-/// A floor, balls over it, and lights of each kind of place: one that all see from afar, one that is near, a flat one.
+/// A floor, balls over it, and lights: a sphere that all see from afar, one that is near, one of triangles.
 fn stage() -> (Scene, Pose) {
     let at = |x, z| Vec3::new(x, 0.0, z);
     let mut meshes = vec![quad(at(-4.0, 4.0), at(4.0, 4.0), at(4.0, -4.0), at(-4.0, -4.0))];
@@ -131,4 +131,73 @@ fn members_have_the_irradiance_of_the_closed_form() {
         }
     }
     assert!((sum / exact - 1.0).abs() < 0.01, "{sum}, exactly {exact}");
+}
+
+/// Surroundings and what is too near have places of each entry's own: as much light as alone, from all of them together.
+#[test]
+fn what_nobody_can_share_is_there_too() {
+    let (mut scene, pose) = stage();
+    for instance in &mut scene.instances {
+        instance.casts = false;
+    }
+    let sky = Environment::new(8, 4, vec![Vec3::splat(0.4); 32], Mat3::IDENTITY).unwrap();
+    let tracer = Tracer::new(&scene, &pose);
+    let lights = AreaLights::new(&scene, &pose).with_environment(&sky, &pose);
+    assert_eq!(lights.len(), 4);
+    // The near light is a quarter of a metre from the rim of their ball.
+    let center = Vec3::new(-0.45, 0.0, -0.45);
+    let ball = (center + Vec3::new(0.45, 0.0, 0.45), 0.64);
+    assert!(lights.spot(1, ball, [0.5; 3]).is_none() && lights.spot(0, ball, [0.5; 3]).is_some());
+    let mut found = [0.0f64; 4];
+    let mut alone = [0.0f64; 4];
+    let sites = 400;
+    for site in 0..sites {
+        let mut members = members(center, 0.3, 24);
+        sample(&tracer, &lights, &source(5), site, &mut members);
+        for (i, member) in members.iter().enumerate() {
+            for sample in &member.drawn.samples {
+                found[sample.light as usize] += f64::from(sample.value.x);
+            }
+            let place = EntryPlace {
+                position_world: center + Vec3::new((i % 4) as f32, 0.0, (i / 4) as f32) * 0.3,
+                normal_world: Vec3::Y,
+                normal_shading_world: Vec3::Y,
+                ..EntryPlace::default()
+            };
+            let chooser = chooser_for(&lights, &place, &source(6));
+            let own =
+                take_samples(&tracer, &lights, &chooser, &place, &source(6), site * 16 + i as u64, 0..24);
+            for sample in &own.samples {
+                alone[sample.light as usize] += f64::from(sample.value.x);
+            }
+        }
+    }
+    for light in 0..4 {
+        let ratio = found[light] / alone[light];
+        assert!((ratio - 1.0).abs() < 0.03, "light {light}: {found:?}, alone {alone:?}");
+    }
+}
+
+/// Entries that came later go on from where the oldest are, and draw nothing twice when these are not there.
+#[test]
+fn nobody_draws_a_place_twice() {
+    let (scene, pose) = stage();
+    let (tracer, lights) = (Tracer::new(&scene, &pose), AreaLights::new(&scene, &pose));
+    let mut group = members(Vec3::ZERO, 0.05, 16);
+    group[3].taken = 32;
+    let (first, _) = sample(&tracer, &lights, &source(1), 9, &mut group);
+    assert_eq!(first, 32);
+    let young = std::mem::take(&mut group[0].drawn.samples);
+    // Moved there, the young are without the old now.
+    let mut next = members(Vec3::ZERO, 0.05, 16);
+    next.iter_mut().for_each(|member| member.taken = first + 16);
+    sample(&tracer, &lights, &source(1), 9, &mut next);
+    assert!(!young.is_empty() && !next[0].drawn.samples.is_empty());
+    for sample in &next[0].drawn.samples {
+        assert!(young.iter().all(|before| before.direction != sample.direction), "{sample:?}");
+    }
+    let mut entry = MomentEntry::default();
+    entry.skip_to(first);
+    entry.update_seen(&young, &[], 16, |_| 1.0, &SlcParams::default().moment);
+    assert_eq!((entry.taken(), entry.samples()), (first + 16, 16));
 }

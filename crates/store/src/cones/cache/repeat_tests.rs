@@ -127,3 +127,40 @@ fn only_the_same_is_repeated() {
     assert!(requests.gather_again(&views, &LookUp::default()));
     assert!(!cache.repeat(&requests, &mut queue), "never admitted");
 }
+
+/// Squares of blocks come whole, each texel of the queue once.
+#[test]
+fn blocks_beside_each_other_are_updated_at_once() {
+    let pixels = scattered(3, 4000);
+    for up in [0, 1, 2] {
+        let mut cache = cache(100_000);
+        let queue =
+            cache.admit(&Requests::gather(&[View { width: 64, pixels: &pixels }], &LookUp::default()));
+        let squares = std::sync::Mutex::new(Vec::new());
+        let done = cache.update_blocks(&queue, up, |blocks| {
+            let square = blocks[0].key.square(up);
+            assert!(blocks.iter().all(|block| block.key.square(up) == square));
+            let mut texels = Vec::new();
+            for block in &mut *blocks {
+                for i in 0..block.texels.len() {
+                    assert_eq!(queue.texels[block.first + i], block.texels[i]);
+                    texels.push(block.first + i);
+                    block.entry(i).skip_to(7);
+                    block.touched[i] = if i % 2 == 0 { Touch::Updated } else { Touch::Changed };
+                }
+            }
+            squares.lock().unwrap().push((square, texels));
+        });
+        let squares = squares.into_inner().unwrap();
+        let names: std::collections::BTreeSet<BlockKey> = squares.iter().map(|(square, _)| *square).collect();
+        assert_eq!(names.len(), squares.len(), "each square once");
+        let mut all: Vec<usize> = squares.into_iter().flat_map(|(_, texels)| texels).collect();
+        all.sort_unstable();
+        assert!(all.iter().copied().eq(0..queue.texels.len()), "each texel once");
+        assert!(queue.texels.iter().all(|texel| cache.entry(texel.id).unwrap().taken() == 7));
+        assert!(done.unwrap() * 2 >= queue.texels.len() as u64);
+    }
+    // Left of and under the origin, too.
+    let key = BlockKey { instance: 0, chart: 0, level: 0, slab: 0, x: -1, y: -3 };
+    assert_eq!((key.square(1).x, key.square(1).y, key.square(200).y), (-1, -2, -1));
+}

@@ -142,7 +142,7 @@ impl MomentEntry {
     }
 }
 
-/// Angle by its cosine, radians, to 7 × 10⁻⁵ and five thousandths of a percent ([Abramowitz1964] 4.4.45): good enough to say which cone is nearer.
+/// Angle by its cosine, radians, to 7 × 10⁻⁵ and five thousandths of a percent ([Abramowitz1964] 4.4.45): good enough to say which cone is nearer, and which holds a sample.
 #[inline]
 fn quick_angle(cosine: f32) -> f32 {
     let x = cosine.abs().min(1.0);
@@ -154,4 +154,24 @@ fn quick_angle(cosine: f32) -> f32 {
 fn distance(a: &MomentCone, b: &MomentCone, params: &MomentParams) -> f32 {
     let apart = params.tagged && !a.lights.meets(b.lights);
     quick_angle(a.direction().dot(b.direction())) + if apart { params.apart_rad } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quick_angle;
+
+    #[test]
+    fn a_quick_angle_is_nearly_the_angle() {
+        for i in -1000..=1000 {
+            let cosine = i as f32 / 1000.0;
+            let exact = libm::acosf(cosine);
+            assert!((quick_angle(cosine) - exact).abs() < 8e-5, "{cosine}");
+        }
+        // Small angles by parts of themselves; and what rounding takes out of range.
+        for angle in [1e-2f32, 0.1] {
+            let miss = 2.0 * libm::sinf(0.5 * angle) * libm::sinf(0.5 * angle);
+            assert!((quick_angle(1.0 - miss) / angle - 1.0).abs() < 2e-3, "{angle}");
+        }
+        assert_eq!((quick_angle(1.000_001), quick_angle(-1.5)), (0.0, std::f32::consts::PI));
+    }
 }
