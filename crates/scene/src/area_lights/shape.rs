@@ -395,10 +395,9 @@ impl Shape {
         }
     }
 
-    /// Whether there is one goes by the first of `u` alone: who then chooses for themselves may move the others.
-    ///
     /// A place for all that may stand in a ball: for everyone in it, all that can be seen of the shape has a density. `None` where that would be of
     /// little use: the ball holds places on both sides of what shines from both, or is near a sphere for its size.
+    /// Whether there is one goes by the first of `u` alone: who then chooses for themselves may move the others.
     pub(super) fn spot(&self, (from, spread): (Vec3, f32), two_sided: bool, u: [f32; 3]) -> Option<Spot> {
         let Shape::Sphere { center, radius } = self else {
             let spot = self.on_area(u)?;
