@@ -51,8 +51,9 @@ fn area_gloss(r: Reflectance, s: AreaSurface, axis: vec3<f32>, cos_angle: f32, h
 
 // What of gloss is the same for all directions of light.
 struct Lobe {
-    // Squared alpha.
+    // Squared alpha, and that of the lobe where a direction stands for more than itself.
     a2: f32,
+    wide_a2: f32,
     n_dot_v_signed: f32,
     n_dot_v: f32,
     lambda_v: f32,
@@ -61,7 +62,7 @@ struct Lobe {
 fn lobe_of(s: AreaSurface, a2: f32) -> Lobe {
     let n_dot_v_signed = dot(s.normal, s.to_viewer);
     let n_dot_v = clamp(n_dot_v_signed, 1e-3, 1.0);
-    return Lobe(a2, n_dot_v_signed, n_dot_v, sqrt(n_dot_v * n_dot_v * (1.0 - a2) + a2));
+    return Lobe(a2, a2, n_dot_v_signed, n_dot_v, sqrt(n_dot_v * n_dot_v * (1.0 - a2) + a2));
 }
 
 // What reflectance is made of, for light from one direction: n·l (1 − f), D V n·l (1 − f), D V n·l f, with f Schlick's fifth power, and n·l, all above
@@ -75,10 +76,10 @@ fn reflected_parts(s: AreaSurface, lobe: Lobe, l: vec3<f32>) -> vec4<f32> {
     let vh = clamp((1.0 + vl) * reciprocal, 0.0, 1.0);
     let nh = clamp((lobe.n_dot_v_signed + shading) * reciprocal, 0.0, 1.0);
     let miss = fifth_power(1.0 - vh);
-    let f = (1.0 - nh) * (1.0 + nh) + nh * nh * lobe.a2;
+    let f = (1.0 - nh) * (1.0 + nh) + nh * nh * lobe.wide_a2;
     let safe = max(nl, 1e-3);
     let smith = safe * lobe.lambda_v + lobe.n_dot_v * sqrt(safe * safe * (1.0 - lobe.a2) + lobe.a2);
-    let dv = (0.5 * FRAC_1_PI * lobe.a2) * nl / (f * f * smith);
+    let dv = (0.5 * FRAC_1_PI * lobe.wide_a2) * nl / (f * f * smith);
     return vec4(nl * (1.0 - miss), dv * (1.0 - miss), dv * miss, nl);
 }
 

@@ -65,7 +65,7 @@ impl<'a, E: ConeEntry + Caps> Blender<'a, E> {
         let mut used = 0;
         let mut mean = Vec3::ZERO;
         let mut heaviest: Option<(f32, Vec3, &Read<'_>)> = None;
-        let each_apart = self.shading.blending == Blending::Cones || count == 1;
+        let each_apart = self.shading.blending == Blending::Cones || count == 1 || is_smooth(point);
         let widest = widest_part(point);
         // The light whose shape stands for a cone, what is seen of it, and for how much of the cone: the rest is the cone's.
         let shape_of = |cone: &TableCap| {
@@ -200,13 +200,18 @@ impl Seen {
 /// 1 − cos a of the widest cone of a part of a light that one cone for all entries about a sample stands for. On smooth surfaces it is seen of wide
 /// ones that each entry sees another part, which several cones may be.
 fn widest_part(point: &ShadingPoint) -> f32 {
-    let alpha = point.reflectance.alpha;
-    if alpha >= ROUGH_ALPHA || !point.reflectance.specular {
+    if !is_smooth(point) {
         return f32::INFINITY;
     }
     // As wide as the lobe, about.
-    let chord = 1.2 * (0.04 + 0.6 * alpha);
+    let chord = 1.2 * (0.04 + 0.6 * point.reflectance.alpha);
     0.5 * chord * chord
+}
+
+/// Whether a surface shows where light comes from: one entry's cones cannot stand for another's.
+#[inline(always)]
+fn is_smooth(point: &ShadingPoint) -> bool {
+    point.reflectance.specular && point.reflectance.alpha < ROUGH_ALPHA
 }
 
 #[inline(always)]

@@ -69,6 +69,16 @@ fn shaded_after(
     cones: [&[MomentCone]; 4],
     lights: Option<&AreaLightTable>,
 ) -> Vec3 {
+    shaded_by(&SlcShading::default(), samples, point, cones, lights)
+}
+
+fn shaded_by(
+    shading: &SlcShading,
+    samples: u16,
+    point: &ShadingPoint,
+    cones: [&[MomentCone]; 4],
+    lights: Option<&AreaLightTable>,
+) -> Vec3 {
     let pixels = [Some(between_four())];
     let mut cache = ConeCache::<MomentEntry>::new(CacheParams::default()).unwrap();
     let queue = cache.admit(&Requests::gather(&[View { width: 1, pixels: &pixels }], &LookUp::default()));
@@ -80,7 +90,7 @@ fn shaded_after(
     assert_eq!(cache.update(&queue, update), Ok(4));
     let site = EntrySite { position_world: Vec3::ZERO, normal_world: Vec3::Y, normal_shading_world: Vec3::Y };
     let light = ConeLight { cache: &cache, place_of: |_| Some(site), lights };
-    shade_cones(&CapTable::new(&light), &[Some(*point)], &pixels, &SlcShading::default())[0]
+    shade_cones(&CapTable::new(&light), &[Some(*point)], &pixels, shading)[0]
 }
 
 fn by_shape(point: &ShadingPoint, table: &AreaLightTable) -> Vec3 {
@@ -151,6 +161,23 @@ fn settled_entries_show_parts_by_their_cones_and_what_is_narrow_and_whole_by_its
     // Half way.
     let between = shaded_after(64, &rough, [&half; 4], Some(&table));
     assert_near(between, 0.5 * (settled(&rough, &half, None) + shaded(&rough, [&half; 4], Some(&table))));
+}
+
+/// The highlights of all four, where there are any to be seen.
+#[test]
+fn smooth_surfaces_show_the_cones_of_each_entry() {
+    let from = |x: f32| {
+        let direction = Vec3::new(x, 1.5, -0.3).normalize();
+        [MomentCone::from_cap(direction, 0.999, Vec3::splat(0.2), 0.95, LightSet::one(0))]
+    };
+    let [a, b, c, d] = [0.3, 0.45, 0.6, 0.75].map(from);
+    let each = SlcShading { blending: Blending::Cones, ..SlcShading::default() };
+    let found = |roughness, shading| shaded_by(&shading, 16, &floor(roughness), [&a, &b, &c, &d], None);
+    assert_eq!(found(0.3, SlcShading::default()), found(0.3, each));
+    assert!(found(0.9, SlcShading::default()) != found(0.9, each));
+    // Each as much as it weighs.
+    let alone = [&a, &b, &c, &d].map(|cones| shaded(&floor(0.3), [cones; 4], None));
+    assert_near(found(0.3, each), alone.iter().sum::<Vec3>() / 4.0);
 }
 
 /// Whatever changes, of the entries or of the lights, caps that are kept are those made anew.
@@ -243,7 +270,7 @@ proptest! {
     #[test]
     fn no_material_and_no_cone_breaks_a_picture(
         point in any_point(),
-        cones in prop::array::uniform4(prop::collection::vec(any_cone(), 0..4)),
+        cones in prop::array::uniform4(prop::collection::vec(any_cone(), 0..=4)),
         samples in 0u16..300,
         shapes in any::<bool>(),
     ) {

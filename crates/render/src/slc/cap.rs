@@ -79,6 +79,8 @@ pub(super) struct Lanes {
     diffuse: [f32; LANES],
     gloss: [f32; LANES],
     grazing: [f32; LANES],
+    /// Squared roughness of the lobe that stands for the part of a cone about a direction.
+    a2: [f32; LANES],
     waiting: [Waiting; WAITING],
 }
 
@@ -92,6 +94,7 @@ impl Lanes {
             diffuse: empty,
             gloss: empty,
             grazing: empty,
+            a2: empty,
             waiting: [Waiting::default(); WAITING],
         }
     }
@@ -186,7 +189,9 @@ impl<'a> Lens<'a> {
     fn spread<const N: usize>(&mut self, cap: &Cap, ground: &Ground, part: f32, pattern: &Pattern<N>) {
         let (first, axis) = (self.used, cap.direction);
         let lanes = first..first + N;
-        let Lanes { x, y, z, .. } = &mut *self.lanes;
+        let Lanes { x, y, z, a2, .. } = &mut *self.lanes;
+        // Each direction shows the part of the cone about it, 1 − cos s = (1 − cos a) / N, half of which half vectors turn by: as much variance as s² / 8.
+        a2[lanes.clone()].fill(self.a2 + 0.25 * (1.0 - cap.cos_angle) / N as f32);
         let (x, y, z) = (&mut x[lanes.clone()], &mut y[lanes.clone()], &mut z[lanes]);
         if N == 1 {
             (x[0], y[0], z[0]) = (axis.x, axis.y, axis.z);
@@ -260,16 +265,16 @@ impl<'a> Lens<'a> {
     #[allow(clippy::needless_range_loop)] // several lists of lanes at once
     #[inline(always)]
     fn flush_glossy(&mut self) {
-        let Lanes { x, y, z, diffuse, gloss, grazing, waiting } = &mut *self.lanes;
+        let Lanes { x, y, z, diffuse, gloss, grazing, a2: wide, waiting } = &mut *self.lanes;
         let (n, s, v) =
             (self.point.normal_world, self.point.normal_shading_world, self.point.to_viewer_world);
         let (a2, nv, nv_signed, lambda_v) = (self.a2, self.n_dot_v, self.n_dot_v_signed, self.lambda_v);
         let steps = self.used.div_ceil(STEP);
-        let [x, y, z] = [x, y, z].map(|lane| &lane.as_chunks::<STEP>().0[..steps]);
+        let [x, y, z, wide] = [x, y, z, wide].map(|lane| &lane.as_chunks::<STEP>().0[..steps]);
         let [out_diffuse, out_gloss, out_grazing] =
             [&mut *diffuse, &mut *gloss, &mut *grazing].map(|lane| lane.as_chunks_mut::<STEP>().0);
         for step in 0..steps {
-            let (x, y, z) = (&x[step], &y[step], &z[step]);
+            let (x, y, z, wide) = (&x[step], &y[step], &z[step], &wide[step]);
             let (out_diffuse, out_gloss, out_grazing) =
                 (&mut out_diffuse[step], &mut out_gloss[step], &mut out_grazing[step]);
             for i in 0..STEP {
@@ -284,11 +289,11 @@ impl<'a> Lens<'a> {
                 let nh = ((nv_signed + nl_signed) * reciprocal).clamp(0.0, 1.0);
                 let miss = 1.0 - vh;
                 let f5 = (miss * miss) * (miss * miss) * miss;
-                let f = (1.0 - nh) * (1.0 + nh) + nh * nh * a2;
+                let f = (1.0 - nh) * (1.0 + nh) + nh * nh * wide[i];
                 let nl_safe = nl.max(1e-3);
                 let smith = nl_safe * lambda_v + nv * (nl_safe * nl_safe * (1.0 - a2) + a2).sqrt();
                 // D V n·l in one quotient.
-                let dv = (0.5 * FRAC_1_PI * a2) * nl / (f * f * smith);
+                let dv = (0.5 * FRAC_1_PI * wide[i]) * nl / (f * f * smith);
                 out_diffuse[i] = nl * (1.0 - f5);
                 out_gloss[i] = dv * (1.0 - f5);
                 out_grazing[i] = dv * f5;

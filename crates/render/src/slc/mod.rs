@@ -83,7 +83,8 @@ impl Caps for BoundingEntry {
 /// What is shaded of the entries that a sample blends.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Blending {
-    /// The cones of the one that most light comes from, brought to the mean irradiance of all: a quarter of the work.
+    /// The cones of the one that most light comes from, brought to the mean irradiance of all: a quarter of the work. On smooth surfaces, which show where
+    /// light comes from, the cones of each all the same.
     #[default]
     Irradiance,
     /// The cones of each.

@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use dapple_scene::area_lights::{AreaLights, largest_cosine};
+use dapple_scene::area_lights::AreaLights;
 use dapple_scene::glam::Vec3;
 use dapple_scene::{Pose, PosedInstance, Scene};
-use dapple_store::cones::{MomentEntry, ReAim};
 use rayon::prelude::*;
 
 use super::EntryPlace;
@@ -23,10 +22,10 @@ pub struct Moment<'a> {
 
 /// Two moments of a scene, compared.
 pub struct Changes<'a> {
-    now: &'a AreaLights<'a>,
-    before: &'a AreaLights<'a>,
+    pub(super) now: &'a AreaLights<'a>,
+    pub(super) before: &'a AreaLights<'a>,
     /// A light each: moved, or shines differently.
-    lights: Vec<bool>,
+    pub(super) lights: Vec<bool>,
     reaches: Vec<Reach>,
     /// An instance each: moved or bent.
     moved: Vec<bool>,
@@ -140,7 +139,8 @@ impl<'a> Changes<'a> {
                 || self.covered(light, position, normal) > 0.0)
     }
 
-    pub(super) fn of(&self, place: &EntryPlace, instance: u32) -> Change {
+    /// `arrivals`: cleared, and what was asked for is left in it.
+    pub(super) fn of(&self, place: &EntryPlace, instance: u32, arrivals: &mut Arrivals) -> Change {
         if self.nothing {
             return Change::default();
         }
@@ -148,18 +148,17 @@ impl<'a> Changes<'a> {
             return Change { share: 1.0, hidden: true, new: 0.0 };
         }
         // Cones hold light by the cosine to the shading normal.
-        let (position, normal) = (place.position_world, place.normal_shading_world);
-        let arriving = |light: usize| {
-            let energy = self.now.arriving(light, position, normal);
-            if self.lights[light] {
-                energy.max(self.before.arriving(light, position, normal))
-            } else {
-                energy
-            }
+        let mut arriving = |light: usize| {
+            let [before, now] = arrivals.of(light, place, self);
+            before.max(now)
         };
         let (mut part, mut new, mut all, mut hidden) = (0.0, 0.0, 0.0, false);
         for light in 0..self.now.len() {
-            let (changed, covered) = (self.lights[light], self.covered(light, position, place.normal_world));
+            let changed = self.lights[light];
+            // Of a light that changed it is only asked whether any is.
+            let is_known = changed && hidden;
+            let covered =
+                if is_known { 0.0 } else { self.covered(light, place.position_world, place.normal_world) };
             if !changed && covered <= 0.0 {
                 continue;
             }
@@ -179,7 +178,7 @@ impl<'a> Changes<'a> {
             return Change::default();
         }
         let unchanged = (0..self.now.len()).filter(|light| !self.lights[*light]);
-        all += unchanged.map(arriving).sum::<f32>();
+        all += unchanged.map(&mut arriving).sum::<f32>();
         // Sums in another order may differ in the last bit.
         Change { share: f32::min(part / all, 1.0), hidden, new: f32::min(new / all, 1.0) }
     }
@@ -210,63 +209,31 @@ impl<'a> Changes<'a> {
     }
 }
 
-impl Change {
-    /// Turns the cones of lights that moved after them.
-    pub(super) fn re_aim(&self, entry: &mut MomentEntry, place: &EntryPlace, changes: &Changes<'_>) {
-        let moved = place.position_before_world != place.position_world
-            || place.normal_shading_before_world != place.normal_shading_world;
-        for (light, changed) in changes.lights.iter().enumerate() {
-            if !changed && !moved || !entry.holds_alone(light as u32) {
-                continue;
-            }
-            let Some(then) = changes.before.bounds(light) else { continue };
-            let gone = changes.now.bounds(light).is_none();
-            let now = changes.now.bounds(light).unwrap_or(then);
-            let (a, b) = (then.0 - place.position_before_world, now.0 - place.position_world);
-            let (Some(from), Some(to)) = (a.try_normalize(), b.try_normalize()) else { continue };
-            let fluence = |lights: &AreaLights<'_>, position| lights.arriving(light, position, Vec3::ZERO);
-            let fluence_before = fluence(changes.before, place.position_before_world);
-            let fluence_after = if gone { 0.0 } else { fluence(changes.now, place.position_world) };
-            let before = fluence_before * mean_cosine(place.normal_shading_before_world, a, then.1);
-            let after = fluence_after * mean_cosine(place.normal_shading_world, b, now.1);
-            // What a cone has of fluence came from above the horizon.
-            let fluence_before = fluence_before * part_above(place.normal_shading_before_world, a, then.1);
-            let fluence_after = fluence_after * part_above(place.normal_shading_world, b, now.1);
-            if before <= 0.0 || then.1 <= 0.0 {
-                continue;
-            }
-            let size_ratio = (now.1 / b.length()) / (then.1 / a.length());
-            entry.re_aim(&ReAim {
-                light: light as u32,
-                from,
-                to,
-                energy_ratio: after / before,
-                fluence_ratio: fluence_after / fluence_before,
-                most_cosine: largest_cosine(place.normal_shading_world, b, now.1),
-                size_ratio,
-            });
+/// Irradiance (luminance, W/m²) of each light at one entry if nothing stood between, before and now: each asked for once.
+#[derive(Default)]
+pub(super) struct Arrivals(Vec<[f32; 2]>);
+
+impl Arrivals {
+    /// Forgets those of another entry.
+    pub(super) fn clear(&mut self, lights: usize) {
+        self.0.clear();
+        self.0.resize(lights, [f32::NAN; 2]);
+    }
+
+    /// Before and now.
+    pub(super) fn of(&mut self, light: usize, place: &EntryPlace, changes: &Changes<'_>) -> [f32; 2] {
+        let Some(known) = self.0.get_mut(light) else { return [0.0; 2] };
+        if known[1].is_nan() {
+            let now = changes.now.arriving(light, place.position_world, place.normal_shading_world);
+            let stays = !changes.lights[light]
+                && place.position_before_world == place.position_world
+                && place.normal_shading_before_world == place.normal_shading_world;
+            let (position, normal) = (place.position_before_world, place.normal_shading_before_world);
+            let before = if stays { now } else { changes.before.arriving(light, position, normal) };
+            *known = [before, now];
         }
+        *known
     }
-}
-
-/// Mean cosine to a normal of light from a ball at an offset: that to its centre while all of it is above the horizon, and from there on falling
-/// to 0 with what is left above.
-fn mean_cosine(normal: Vec3, offset: Vec3, radius: f32) -> f32 {
-    let distance = offset.length();
-    if distance <= radius {
-        return 1.0;
-    }
-    let (cosine, sine) = (normal.dot(offset) / distance, radius / distance);
-    if cosine >= sine {
-        return cosine;
-    }
-    let above = (cosine + sine).max(0.0);
-    above * above / (4.0 * sine.max(f32::MIN_POSITIVE))
-}
-
-/// Part of a ball at an offset that is above the horizon, by its height; what is less than a tenth counts as that, since ratios of it say nothing.
-fn part_above(normal: Vec3, offset: Vec3, radius: f32) -> f32 {
-    (0.5 + 0.5 * normal.dot(offset) / radius.max(f32::MIN_POSITIVE)).clamp(0.1, 1.0)
 }
 
 /// A ball that holds an instance: about the middle of its box, and just large enough for its vertices, since all entries whose light it may meet take rays

@@ -9,6 +9,9 @@
 //! Equations, deviations and parameters in `README.md`.
 
 mod changes;
+mod follow;
+#[cfg(test)]
+mod follow_tests;
 mod paper;
 mod places;
 #[cfg(test)]
@@ -30,6 +33,7 @@ use dapple_store::cones::{
 use crate::bvh::{Tracer, offset_origin};
 use crate::direct::{Draws, Sequence};
 use crate::sampling::hash;
+use changes::Arrivals;
 pub use changes::{Changes, Moment};
 pub use paper::PaperParams;
 pub use places::{EntryPlace, EntryPlaces};
@@ -145,13 +149,15 @@ impl Update for MomentEntry {
                 return;
             }
             let group = Group::of(&blocks[0].key, params.together);
+            let mut arrivals = Arrivals::default();
             let mut counts = vec![[0; BLOCK_TEXELS]; blocks.len()];
             for (block, counts) in blocks.iter_mut().zip(&mut counts) {
                 for (i, count) in counts.iter_mut().enumerate().take(block.texels.len()) {
                     let Some(place) = places.get(block.first + i) else { continue };
                     let texel = &block.texels[i];
                     let turns = (frame, turn_of(texel.id), group.turn(texel.id));
-                    let (touch, wanted) = prepare(block.entry(i), texel, place, changes, params, turns);
+                    let (touch, wanted) =
+                        prepare(block.entry(i), texel, place, changes, params, turns, &mut arrivals);
                     changed.fetch_add(u64::from(wanted.is_changed), Ordering::Relaxed);
                     (block.touched[i], *count) = (touch, wanted.count);
                 }
@@ -181,9 +187,11 @@ fn prepare(
     changes: &Changes<'_>,
     params: &SlcParams,
     (frame, turn, group_turn): (u32, u32, u32),
+    arrivals: &mut Arrivals,
 ) -> (Touch, Wanted) {
     let mut touch = Touch::Nothing;
-    let change = changes.of(place, texel.instance);
+    arrivals.clear(changes.lights().len());
+    let change = changes.of(place, texel.instance, arrivals);
     if texel.moved {
         // What it knows is of a place beside it.
         ConeEntry::cut_confidence(entry, KEPT as u16);
@@ -202,7 +210,7 @@ fn prepare(
         touch = Touch::Changed;
         let root = change.share.sqrt();
         if params.re_aim {
-            change.re_aim(entry, place, changes);
+            follow::follow(entry, place, changes, arrivals);
         }
         let kept = if params.re_aim && !change.hidden { KEPT_RE_AIMED } else { KEPT };
         // Of a light that was not there, what the entry knows says nothing.

@@ -49,11 +49,16 @@ fn shape_share(cone: Cone, widest: f32) -> f32 {
 
 // 1 − cos a of the widest cone of a part of a light that one cone for all entries stands for.
 fn widest_part(p: ConePoint) -> f32 {
-    if p.reflectance.alpha >= AREA_ROUGH_ALPHA || !p.has_gloss {
+    if !is_smooth(p) {
         return 3.0;
     }
     let chord = 1.2 * (0.04 + 0.6 * p.reflectance.alpha);
     return 0.5 * chord * chord;
+}
+
+// Whether a surface shows where light comes from: one entry's cones cannot stand for another's.
+fn is_smooth(p: ConePoint) -> bool {
+    return p.has_gloss && p.reflectance.alpha < AREA_ROUGH_ALPHA;
 }
 
 fn lit_by(p: ConePoint, before: Lit, cone: Cone, site: Site, part: f32) -> Lit {
@@ -64,7 +69,9 @@ fn lit_by(p: ConePoint, before: Lit, cone: Cone, site: Site, part: f32) -> Lit {
     }
     let n = f32(count);
     let basis = orthonormal_basis(cone.direction);
-    let lobe = lobe_of(p.surface, p.reflectance.alpha * p.reflectance.alpha);
+    var lobe = lobe_of(p.surface, p.reflectance.alpha * p.reflectance.alpha);
+    // Each direction shows the part of the cone about it.
+    lobe.wide_a2 += 0.25 * depth / n;
     var sums = vec4(0.0);
     // Of the entry: cosines, and directions above its horizon.
     var over = 0.0;
@@ -141,7 +148,7 @@ fn reflected_of_cones(p: ConePoint, place: Place) -> vec3<f32> {
         }
     }
 
-    let each_apart = (params.flags & CONE_EACH_APART) != 0u || kept == 1;
+    let each_apart = (params.flags & CONE_EACH_APART) != 0u || kept == 1 || is_smooth(p);
     let widest = widest_part(p);
     var lit = Lit(vec3(0.0), vec3(0.0), vec3(0.0));
     // As many as four entries have cones.

@@ -114,7 +114,7 @@ proptest! {
             entry.update(&[hostile, plain], drawn, &params);
             let [from, to] = [Vec3::new(f[0], f[1], f[2]), Vec3::new(f[3], f[4], f[5])];
             let (energy_ratio, fluence_ratio, size_ratio, most_cosine) = (f[6], f[5], f[7], f[4]);
-            entry.re_aim(&ReAim { light, from, to, energy_ratio, fluence_ratio, most_cosine, size_ratio });
+            entry.re_aim(LightSet::one(light), &ReAim { from, to, energy_ratio, fluence_ratio, most_cosine, size_ratio });
             for cone in entry.cones() {
                 prop_assert!(cone.energy.is_finite() && cone.energy.min_element() >= 0.0, "{cone:?}");
                 prop_assert!(cone.moment.is_finite() && cone.angle().is_finite(), "{cone:?}");
@@ -266,7 +266,6 @@ fn a_cone_of_one_light_follows_it() {
     entry.update(&[sample(tilted(-50.0), Vec3::ONE, 4)], 2, &params);
     let before = entry;
     let aim = ReAim {
-        light: 3,
         from: tilted(10.0),
         to: tilted(40.0),
         energy_ratio: 0.5,
@@ -274,7 +273,7 @@ fn a_cone_of_one_light_follows_it() {
         most_cosine: 1.0,
         size_ratio: 2.0,
     };
-    assert_eq!(entry.re_aim(&aim), 1);
+    assert_eq!(entry.re_aim(LightSet::one(3), &aim), 1);
     let [turned, other] = entry.cones() else { panic!("two cones") };
     assert!((tilt(turned.direction()) - 40.0).abs() < 0.1);
     assert!((turned.angle() / before.cones()[0].angle() - 2.0).abs() < 0.02);
@@ -289,14 +288,25 @@ fn a_cone_of_one_light_follows_it() {
         size_ratio: 1.0,
         ..aim
     };
-    entry.re_aim(&aim);
+    entry.re_aim(LightSet::one(3), &aim);
     assert!(entry.cones()[0].direction().distance(-tilted(40.0)) < 1e-2);
     // Gone dark.
-    assert_eq!(entry.re_aim(&ReAim { energy_ratio: 0.0, fluence_ratio: 0.0, ..aim }), 1);
+    assert_eq!(entry.re_aim(LightSet::one(3), &ReAim { energy_ratio: 0.0, fluence_ratio: 0.0, ..aim }), 1);
     assert_eq!(entry.cones().len(), 1);
+    // Of several lights: those that have just these.
+    let mut shared = MomentEntry::default();
+    shared.update(&near, 2, &MomentParams { cones: 1, ..params });
+    shared.update(&[sample(tilted(-50.0), Vec3::ONE, 4)], 1, &MomentParams { cones: 1, ..params });
+    let both = LightSet::one(3).union(LightSet::one(4));
+    let half = ReAim { energy_ratio: 0.5, fluence_ratio: 0.5, ..aim };
+    assert_eq!([3, 4].map(|light| shared.re_aim(LightSet::one(light), &half)), [0, 0]);
+    let had = shared.energy().y;
+    assert_eq!(shared.re_aim(both, &half), 1);
+    assert!((shared.energy().y / had - 0.5).abs() < 1e-6);
     // No number: nothing happens.
     let still = entry;
-    assert_eq!(entry.re_aim(&ReAim { light: 4, energy_ratio: f32::NAN, fluence_ratio: f32::NAN, ..aim }), 0);
+    let unknown = ReAim { energy_ratio: f32::NAN, fluence_ratio: f32::NAN, ..aim };
+    assert_eq!(entry.re_aim(LightSet::one(4), &unknown), 0);
     assert_eq!(entry, still);
 }
 
@@ -355,7 +365,6 @@ fn what_is_seen_is_the_mean_of_seen_and_hidden_samples() {
     };
     assert!((of(0) - 0.75).abs() < 0.01 && (of(1) - 0.25).abs() < 0.02, "{} {}", of(0), of(1));
     let aim = ReAim {
-        light: 0,
         from: tilted(20.0),
         to: tilted(30.0),
         energy_ratio: 0.5,
@@ -365,7 +374,7 @@ fn what_is_seen_is_the_mean_of_seen_and_hidden_samples() {
     };
     let before = of(0);
     let mut moved = entry;
-    assert_eq!(moved.re_aim(&aim), 1);
+    assert_eq!(moved.re_aim(LightSet::one(0), &aim), 1);
     let cone = moved.cones().iter().find(|c| c.lights.single() == Some(0)).unwrap();
     assert!((luminance(cone.energy) / (luminance(cone.energy) + cone.hidden) - before).abs() < 1e-3);
     assert_eq!(cone.seen, before, "a light that moves is hidden as much as before until samples tell");
@@ -385,7 +394,6 @@ fn a_cone_that_follows_its_light_has_no_more_than_its_fluence_allows() {
     );
     let before = entry.cones()[0];
     let aim = ReAim {
-        light: 2,
         from: tilted(84.0),
         to: tilted(60.0),
         energy_ratio: 1e6,
@@ -394,7 +402,7 @@ fn a_cone_that_follows_its_light_has_no_more_than_its_fluence_allows() {
         size_ratio: 1.0,
     };
     for _ in 0..2 {
-        assert_eq!(entry.re_aim(&aim), 1);
+        assert_eq!(entry.re_aim(LightSet::one(2), &aim), 1);
         let after = entry.cones()[0];
         assert!((after.fluence / before.fluence - 1.0).abs() < 1e-5, "{after:?}");
         assert!((luminance(after.energy) / after.fluence - 0.5).abs() < 1e-5, "{after:?}");
