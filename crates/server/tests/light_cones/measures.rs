@@ -71,7 +71,7 @@ fn ways() -> Vec<Lit> {
     // Nothing is blended that would have other places on lights.
     let alone = SlcParams { together: 1, ..SlcParams::default() };
     let [half, most] = [0.5, 1.7].map(|bias| LookUp { bias, ..near });
-    let few = SlcParams { first_updates: 1, samples: 2, ..SlcParams::default() };
+    let few = SlcParams { first_updates: 1, samples: 2, ..three_cones() };
     vec![
         Lit::new("slc by cones alone", shading, false),
         Lit::new("slc", shading, true),
@@ -219,17 +219,20 @@ fn play(stage: &Stage, walks: bool, more: Vec<Lit>, (steps, timed, samples): (u3
 #[test]
 #[ignore = "measures; minutes"]
 fn lights_that_move() {
-    let only = std::env::var("SCENES").unwrap_or_default();
-    for name in ["street", "hangar"].iter().filter(|n| only.is_empty() || only.contains(**n)) {
+    for name in ["street", "hangar"] {
         println!("{name}\n| | ms a step | server's | PSNR | SSIM | bias, % |");
         let look_up = LookUp { bias: 1.4, blend: false };
-        let few = SlcParams { changed_samples: 6, together: 1, ..SlcParams::default() };
-        let coarse = sampled("one texel 1.4 pixels wide, 6 samples of what changed", look_up, few);
-        let d = SlcParams::default();
-        let four = SlcParams { moment: MomentParams { cones: 3, ..d.moment }, ..d };
-        let four = sampled("slc, 3 cones", LookUp::default(), four);
-        play(&Stage::new(name, 0.3, [320, 180]), false, vec![coarse, four], (40, 9, 256));
+        let few = SlcParams { changed_samples: 6, together: 1, ..three_cones() };
+        let coarse = sampled("one texel 1.4 pixels wide, 3 cones, 6 samples of what changed", look_up, few);
+        let three = sampled("slc, 3 cones", LookUp::default(), three_cones());
+        play(&Stage::new(name, 0.3, [320, 180]), false, vec![coarse, three], (40, 9, 256));
     }
+}
+
+/// As many as the paper has.
+fn three_cones() -> SlcParams {
+    let moment = MomentParams { cones: 3, ..MomentParams::default() };
+    SlcParams { moment, ..SlcParams::default() }
 }
 
 /// Prints what a step takes while the viewer walks, with samples of young entries in so many updates and so many a frame after that.
@@ -254,74 +257,55 @@ fn a_viewer_who_walks() {
     }
 }
 
-/// Prints quality and bias while the viewer walks and while all stands, each the mean of some seeds and moments.
+/// Prints quality and bias, means of two seeds and of six moments of a walk, and the largest bias of any of them; and the same once all has stood for 40 steps.
 #[test]
 #[ignore = "measures; minutes"]
-fn mean_light_of_a_walk() {
-    let only = std::env::var("SCENES").unwrap_or_default();
-    for name in ["hangar", "village", "atrium-lamps", "street"]
-        .iter()
-        .filter(|n| only.is_empty() || only.contains(**n))
-    {
+fn quality_over_a_walk() {
+    let ways = || {
+        let alone = SlcParams { together: 0, ..SlcParams::default() };
+        let near = LookUp { blend: false, ..LookUp::default() };
+        [
+            sampled("slc", LookUp::default(), SlcParams::default()),
+            sampled("places of its own", LookUp::default(), alone),
+            sampled("3 cones", LookUp::default(), three_cones()),
+            sampled("one texel", near, SlcParams { together: 1, ..SlcParams::default() }),
+        ]
+    };
+    println!("| scene | | PSNR | SSIM | bias, % | largest |");
+    for name in ["atrium-lamps", "village", "street", "hangar"] {
         let stage = Stage::new(name, 0.3, [192, 108]);
-        for walks in [true, false] {
-            let (seeds, steps, from) = if walks { (2u64, 24, 3) } else { (2, 40, 39) };
-            let near = LookUp { blend: false, ..LookUp::default() };
-            let d = SlcParams::default();
-            let ways = [
-                ("slc", d, true, LookUp::default()),
-                (
-                    "3 cones",
-                    SlcParams { moment: MomentParams { cones: 3, ..d.moment }, ..d },
-                    true,
-                    LookUp::default(),
-                ),
-                ("one texel", SlcParams { together: 1, ..d }, true, near),
-            ];
-            let mut cones: Vec<Lit> = Vec::new();
-            for (name, params, shapes, look_up) in ways {
-                for seed in 0..seeds {
-                    let mut lit = Lit::new(name, SlcShading { look_up, ..SlcShading::default() }, shapes);
-                    lit.params = SlcParams { seed, ..params };
-                    cones.push(lit);
-                }
+        for (walks, steps) in [(true, 24), (false, 40)] {
+            let mut cones: Vec<Lit> = (0..2).flat_map(|_| ways()).collect();
+            for (i, lit) in cones.iter_mut().enumerate() {
+                lit.params.seed = (i / ways().len()) as u64;
             }
+            let mut found = vec![Vec::new(); ways().len()];
             let mut tracer = Tracer::new(&stage.scene, &stage.scene.pose(stage.time_s));
-            let mut sums = vec![Vec::new(); ways.len()];
-            for step in 0..steps {
-                let pose =
-                    stage.scene.pose(stage.time_s + f64::from(step) / 15.0 * f64::from(u8::from(walks)));
+            for step in 1..=steps {
+                let time_s = stage.time_s + if walks { f64::from(step) / 15.0 } else { 0.0 };
+                let pose = stage.scene.pose(time_s);
                 tracer.update(&stage.scene, &pose);
                 let now = Now { scene: &stage.scene, pose: &pose, tracer: &tracer, environment: None };
                 let seen = stage.see(&now);
                 cones.iter_mut().for_each(|lit| lit.step(&stage, &now, Some(&seen)));
-                if step < from || (walks && step % 4 != 3) {
+                if step % 4 != 0 || !walks && step < steps {
                     continue;
                 }
                 let params = DirectParams { samples: 256, seed: 7, ..DirectParams::default() };
                 let truth = rays(&now, &seen.points, &params);
-                for (lit, sum) in cones.chunks(seeds as usize).zip(&mut sums) {
-                    if std::env::var("EACH").is_ok() {
-                        let q: Vec<_> = lit.iter().map(|lit| stage.quality(&truth, &lit.picture)).collect();
-                        println!(
-                            "  {} step {step} | {:?}",
-                            lit[0].name,
-                            q.iter().map(|q| (q[2] * 100.0).round() / 100.0).collect::<Vec<_>>()
-                        );
-                    }
-                    sum.extend(lit.iter().map(|lit| stage.quality(&truth, &lit.picture)));
+                for (i, lit) in cones.iter().enumerate() {
+                    found[i % ways().len()].push(stage.quality(&truth, &lit.picture));
                 }
             }
-            for (way, sum) in ways.iter().zip(sums) {
-                let mean = |k: usize| sum.iter().map(|q| q[k]).sum::<f64>() / sum.len() as f64;
-                let worst = sum.iter().map(|q| q[2].abs()).fold(0.0, f64::max);
+            for (way, found) in ways().iter().zip(found) {
+                let [db, ssim, bias] = std::array::from_fn(|k| {
+                    found.iter().map(|quality| quality[k]).sum::<f64>() / found.len() as f64
+                });
+                let largest = found.iter().map(|quality| quality[2].abs()).fold(0.0, f64::max);
+                let does = if walks { "walks" } else { "stands" };
                 println!(
-                    "{name} {} | {} | {:.2} | {:.4} | {:+.2} | {worst:.2}",
-                    if walks { "walks" } else { "stands" },
-                    way.0,
-                    mean(0),
-                    mean(1),
-                    mean(2)
+                    "| {name}, {does} | {} | {db:.2} | {ssim:.4} | {bias:+.2} | {largest:.2} |",
+                    way.name
                 );
             }
         }

@@ -139,11 +139,12 @@ impl<'a> Changes<'a> {
                 || self.covered(light, position, normal) > 0.0)
     }
 
-    /// `arrivals`: cleared, and what was asked for is left in it.
+    /// What was asked for is left in `arrivals`.
     pub(super) fn of(&self, place: &EntryPlace, instance: u32, arrivals: &mut Arrivals) -> Change {
         if self.nothing {
             return Change::default();
         }
+        arrivals.clear(self.now.len());
         if self.has_moved(instance) {
             return Change { share: 1.0, hidden: true, new: 0.0 };
         }
@@ -215,7 +216,7 @@ pub(super) struct Arrivals(Vec<[f32; 2]>);
 
 impl Arrivals {
     /// Forgets those of another entry.
-    pub(super) fn clear(&mut self, lights: usize) {
+    fn clear(&mut self, lights: usize) {
         self.0.clear();
         self.0.resize(lights, [f32::NAN; 2]);
     }

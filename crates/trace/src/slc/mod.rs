@@ -190,7 +190,6 @@ fn prepare(
     arrivals: &mut Arrivals,
 ) -> (Touch, Wanted) {
     let mut touch = Touch::Nothing;
-    arrivals.clear(changes.lights().len());
     let change = changes.of(place, texel.instance, arrivals);
     if texel.moved {
         // What it knows is of a place beside it.
