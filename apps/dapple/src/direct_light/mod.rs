@@ -126,14 +126,15 @@ impl Technique {
 
     /// Our cones for a quarter of the rays, half where lights move: texels two pixels wide, and entries that are young for one update.
     pub(crate) fn quick_cones() -> Technique {
-        Technique::cones().with_texels(2.0).changed(OurCones::take_less)
+        let params = SlcParams { first_updates: 1, samples: 2, ..SlcParams::default() };
+        Technique::cones().with_texels(2.0).changed(|cones| cones.params = params)
     }
 
     /// Our cones for as little as still makes a picture: texels 1.7 pixels wide, of which a pixel takes its own alone.
     pub(crate) fn fast_cones() -> Technique {
         let few = |cones: &mut OurCones| {
-            cones.take_less();
-            cones.params.changed_samples = 6;
+            let params = SlcParams { first_updates: 1, samples: 2, changed_samples: 6, ..cones.params };
+            cones.params = params;
         };
         Technique::cones().without_blending().with_texels(1.7).changed(few)
     }
@@ -149,14 +150,6 @@ impl Technique {
             change(cones);
         }
         self
-    }
-}
-
-impl OurCones {
-    /// As many cones as the paper has, and fewer samples of young entries.
-    fn take_less(&mut self) {
-        let SlcParams { moment, first_updates, samples, .. } = &mut self.params;
-        (moment.cones, *first_updates, *samples) = (3, 1, 2);
     }
 }
 

@@ -29,7 +29,7 @@ const LEAST_HIDDEN: f32 = 4.0;
 /// How moment cones are kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MomentParams {
-    /// Cones of an entry, 1 … 4. Default 4: where tens of lights matter, one more than [Stadlbauer2023] sec. 4 has is worth 0.6 dB and hardly takes time.
+    /// Cones of an entry, 1 … 4. Default 3 ([Stadlbauer2023] sec. 4). Where tens of lights matter, one more is worth 0.7 dB, and 8 % of the time.
     pub cones: u8,
     /// A sample is inside a cone up to this many times its opening angle from the axis, 0.5 … 4. Default 1.6.
     pub inside: f32,
@@ -46,7 +46,7 @@ pub struct MomentParams {
 impl Default for MomentParams {
     fn default() -> Self {
         MomentParams {
-            cones: 4,
+            cones: 3,
             inside: 1.6,
             max_samples: 255,
             least_share: 0.001,

@@ -124,7 +124,7 @@ fn our_entry_is_within_its_bounds() {
 /// Energy and angle survive when an entry is packed after every update of one sample.
 #[test]
 fn packing_after_every_update_does_not_drift() {
-    let params = MomentParams { cones: 3, ..MomentParams::default() };
+    let params = MomentParams::default();
     let [(sphere, exact), _, (disc, exact_disc), _] = Light::closed_forms();
     for (light, exact) in [(sphere, exact), (disc, exact_disc)] {
         let (mut plain_sum, mut packed_sum, mut angles) = (0.0, 0.0, [0.0f32; 2]);

@@ -51,7 +51,7 @@ fn papers(change: impl FnOnce(&mut PaperParams, &mut LookUp)) -> Technique {
 
 fn variants() -> Vec<(String, Technique)> {
     let mut all = vec![("slc".to_owned(), Technique::cones())];
-    for cones in [1, 2, 3] {
+    for cones in [1, 2, 4] {
         let moment = MomentParams { cones, ..MomentParams::default() };
         all.push((format!("slc, {cones} cones"), ours(|c| c.params.moment = moment)));
     }
