@@ -191,7 +191,12 @@ impl<'a> Lens<'a> {
         let lanes = first..first + N;
         let Lanes { x, y, z, a2, .. } = &mut *self.lanes;
         // Each direction shows the part of the cone about it, 1 − cos s = (1 − cos a) / N, half of which half vectors turn by: as much variance as s² / 8.
-        a2[lanes.clone()].fill(self.a2 + 0.25 * (1.0 - cap.cos_angle) / N as f32);
+        // The paper's show themselves alone.
+        let wider = match self.form {
+            Form::Ratio => 0.25 * (1.0 - cap.cos_angle) / N as f32,
+            Form::Fluence => 0.0,
+        };
+        a2[lanes.clone()].fill(self.a2 + wider);
         let (x, y, z) = (&mut x[lanes.clone()], &mut y[lanes.clone()], &mut z[lanes]);
         if N == 1 {
             (x[0], y[0], z[0]) = (axis.x, axis.y, axis.z);

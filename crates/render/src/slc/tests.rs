@@ -115,6 +115,32 @@ fn gloss_is_that_of_the_reflectance() {
     }
 }
 
+/// Sixteen directions of a wide cone on a polished floor, seen from many sides: as points of light they are nearly all or nothing, which is what the
+/// paper's form has.
+#[test]
+fn a_wide_cone_on_a_smooth_surface_is_no_swarm_of_points() {
+    let (direction, angle) = (tilted(45.0), 0.4f32);
+    let fluence = Cap {
+        mean_cosine: 1.0,
+        energy: Vec3::splat(TAU * (1.0 - angle.cos())),
+        ..cap(direction, angle, Vec3::Y)
+    };
+    let papers = SlcShading { form: Form::Fluence, ..ratio(16) };
+    let (mut ours, mut theirs, mut all) = (0.0f32, 0.0f32, 0.0f32);
+    for step in -20..=20 {
+        let lean = (45.0 + step as f32).to_radians();
+        let to_viewer_world = Vec3::new(lean.sin(), lean.cos(), 0.1).normalize();
+        let point = ShadingPoint { to_viewer_world, ..floor(0.0, 0.5, 0.15, true) };
+        let exact = exact(&point, direction, angle);
+        let found = |cap: &Cap, shading: &SlcShading| shade(&point, cap, Vec3::Y, shading).x;
+        ours += (found(&cap(direction, angle, Vec3::Y), &ratio(16)) - exact).abs();
+        theirs += (found(&fluence, &papers) - exact).abs();
+        all += exact;
+    }
+    println!("{} and {}", ours / all, theirs / all);
+    assert!(ours < 0.8 * theirs, "{} and {}", ours / all, theirs / all);
+}
+
 #[test]
 fn fluence_and_irradiance_are_the_same_light() {
     let point = floor(0.5, 0.04, 0.5, true);

@@ -276,10 +276,11 @@ fn quality_over_a_walk() {
         let stage = Stage::new(name, 0.3, [192, 108]);
         for (walks, steps) in [(true, 24), (false, 40)] {
             let mut cones: Vec<Lit> = (0..2).flat_map(|_| ways()).collect();
+            let count = cones.len() / 2;
             for (i, lit) in cones.iter_mut().enumerate() {
-                lit.params.seed = (i / ways().len()) as u64;
+                lit.params.seed = (i / count) as u64;
             }
-            let mut found = vec![Vec::new(); ways().len()];
+            let mut found = vec![Vec::new(); count];
             let mut tracer = Tracer::new(&stage.scene, &stage.scene.pose(stage.time_s));
             for step in 1..=steps {
                 let time_s = stage.time_s + if walks { f64::from(step) / 15.0 } else { 0.0 };
@@ -294,10 +295,10 @@ fn quality_over_a_walk() {
                 let params = DirectParams { samples: 256, seed: 7, ..DirectParams::default() };
                 let truth = rays(&now, &seen.points, &params);
                 for (i, lit) in cones.iter().enumerate() {
-                    found[i % ways().len()].push(stage.quality(&truth, &lit.picture));
+                    found[i % count].push(stage.quality(&truth, &lit.picture));
                 }
             }
-            for (way, found) in ways().iter().zip(found) {
+            for (way, found) in cones.iter().zip(found) {
                 let [db, ssim, bias] = std::array::from_fn(|k| {
                     found.iter().map(|quality| quality[k]).sum::<f64>() / found.len() as f64
                 });

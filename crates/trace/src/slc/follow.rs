@@ -16,12 +16,12 @@ pub(super) fn follow(
 ) {
     let moved = place.position_before_world != place.position_world
         || place.normal_shading_before_world != place.normal_shading_world;
-    let (alone, several) = sets_of(entry);
+    let turns = |set: LightSet| {
+        moved || (0u32..).zip(&changes.lights).any(|(light, changed)| *changed && set.may_hold(light))
+    };
+    let (alone, several) = sets_of(entry, turns);
     for set in alone {
         let Some(light) = set.single().map(|light| light as usize) else { continue };
-        if !moved && !changes.lights.get(light).is_some_and(|changed| *changed) {
-            continue;
-        }
         let Some(then) = changes.before.bounds(light) else { continue };
         let gone = changes.now.bounds(light).is_none();
         let now = changes.now.bounds(light).unwrap_or(then);
@@ -52,10 +52,13 @@ pub(super) fn follow(
     follow_several(entry, several, place, changes, arrivals);
 }
 
-/// Lights that an entry's cones are of, each set once: of one light, and of several. What is left over is of none.
-fn sets_of(entry: &MomentEntry) -> ([LightSet; MOST_MOMENT_CONES], [LightSet; MOST_MOMENT_CONES]) {
+/// Lights that those of an entry's cones are of which `turns` says of, each set once: of one light, and of several. What is left over is of none.
+fn sets_of(
+    entry: &MomentEntry,
+    turns: impl Fn(LightSet) -> bool,
+) -> ([LightSet; MOST_MOMENT_CONES], [LightSet; MOST_MOMENT_CONES]) {
     let (mut alone, mut several) = Default::default();
-    for cone in entry.cones() {
+    for cone in entry.cones().iter().filter(|cone| turns(cone.lights)) {
         let sets: &mut [LightSet; MOST_MOMENT_CONES] =
             if cone.lights.single().is_some() { &mut alone } else { &mut several };
         let place = sets.iter_mut().find(|set| **set == cone.lights || **set == LightSet::NONE);

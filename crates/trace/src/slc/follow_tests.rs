@@ -7,7 +7,7 @@ use dapple_scene::{EmitterShape, PosedInstance};
 
 use super::tests::{Rig, assert_near, mean, over};
 use super::*;
-use crate::test_support::sphere;
+use crate::test_support::{quad, sphere};
 
 #[test]
 fn cones_follow_a_light_that_moves() {
@@ -91,4 +91,31 @@ fn a_cone_of_several_lights_follows_them_together() {
     let had = at(0.0).map(irradiance).iter().sum();
     let left = follows(&kept, &mut |_, cache| assert_near(mean(cache), had, 0.02));
     assert_near(left, had, 0.02);
+}
+
+/// What moves before lights that stay may hide them, but turns no cone: not by a bit.
+#[test]
+fn cones_of_lights_that_stay_are_left_alone() {
+    let lamp = |x: f32| {
+        let at = Affine3A::from_translation(Vec3::new(x, 2.0, 0.0));
+        (sphere(Vec3::ZERO, 0.3, 12, 16), EmitterShape::Sphere, 10.0, at)
+    };
+    let at = |x: f32, z: f32| Vec3::new(x, 0.0, z);
+    let shutter = quad(at(-0.5, 0.5), at(0.5, 0.5), at(0.5, -0.5), at(-0.5, -0.5));
+    let rig = Rig::new(vec![lamp(-1.0), lamp(1.0), (shutter, EmitterShape::Triangles, 0.0, over(1.0))]);
+    for cones in [1, 3] {
+        let moment = MomentParams { cones, ..MomentParams::default() };
+        let params = SlcParams { moment, changed_samples: 0, ..SlcParams::default() };
+        let mut cache = rig.settled(20, &params);
+        let cones_of = |cache: &ConeCache<MomentEntry>| {
+            cache.ids().map(|id| cache.entry(id).unwrap().cones().to_vec()).collect::<Vec<_>>()
+        };
+        let had = cones_of(&cache);
+        assert!(had.iter().flatten().any(|cone| cone.lights.single().is_none() == (cones == 1)));
+        let mut moved = rig.pose.clone();
+        moved.instances[3].world_from_mesh = over(1.1);
+        let counts = rig.step(&mut cache, &rig.pose, &moved, &params);
+        assert!(counts.changed > 100, "{counts:?}");
+        assert_eq!(cones_of(&cache), had);
+    }
 }

@@ -70,8 +70,8 @@ fn lit_by(p: ConePoint, before: Lit, cone: Cone, site: Site, part: f32) -> Lit {
     let n = f32(count);
     let basis = orthonormal_basis(cone.direction);
     var lobe = lobe_of(p.surface, p.reflectance.alpha * p.reflectance.alpha);
-    // Each direction shows the part of the cone about it.
-    lobe.wide_a2 += 0.25 * depth / n;
+    // Each direction shows the part of the cone about it; the paper's show themselves alone.
+    lobe.wide_a2 += select(0.0, 0.25 * depth / n, (params.flags & CONE_IS_RATIO) != 0u);
     var sums = vec4(0.0);
     // Of the entry: cosines, and directions above its horizon.
     var over = 0.0;
