@@ -13,6 +13,7 @@ const AREA_DISC: i32 = 2;
 const AREA_QUAD: i32 = 3;
 const AREA_TRIANGLES: i32 = 4;
 const AREA_PLACES: i32 = 5;
+const AREA_FORMS: i32 = 8;
 
 // Light as a cone; nothing arrives where it is black.
 struct AreaArrival {
@@ -20,6 +21,11 @@ struct AreaArrival {
     // Unit axis.
     direction: vec3<f32>,
     cos_angle: f32,
+}
+
+// Beside it lies the light's class.
+fn area_form(shine: vec4<f32>) -> i32 {
+    return i32(shine.w) % AREA_FORMS;
 }
 
 fn area_texel(slot: i32, texel: i32) -> vec4<f32> {
@@ -31,7 +37,7 @@ fn area_arrival(slot: i32, position: vec3<f32>, normal: vec3<f32>) -> AreaArriva
     // A ball that holds it; what it is and how much it shines; where it faces.
     let ball = area_texel(slot, 0);
     let shine = area_texel(slot, 1);
-    let form = i32(shine.w);
+    let form = area_form(shine);
     let offset = ball.xyz - position;
     // A ball below the horizon.
     if form == 0 || dot(normal, offset) <= -ball.w {

@@ -51,8 +51,8 @@ impl<'a> Surface<'a> {
     #[inline(always)]
     pub(crate) fn reflect(&self, arrival: &Arrival) -> Vec3 {
         let count = self.needed(arrival);
-        // Half vectors turn by half of what directions do; α is about the tangent of the lobe's half width.
-        let part = (1.0 - arrival.cos_angle) / (2 * count) as f32;
+        // Each direction shows the part of the cone about it, 1 − cos s = (1 − cos a) / count, half of which half vectors turn by: as much variance as s² / 8.
+        let part = (1.0 - arrival.cos_angle) / (4 * count) as f32;
         let a2 = (self.a2 + part.max(0.0)).min(self.a2.max(1.0));
         let sums = match count {
             1 => self.sums(arrival, a2, &ONE),

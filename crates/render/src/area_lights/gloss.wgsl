@@ -1,7 +1,9 @@
 // What a surface reflects of one cone of light whose irradiance on it is known. The twin is `area_lights::gloss`.
 
-// A golden turn.
-const GOLDEN_TURN: vec2<f32> = vec2(-0.73736888, 0.67549029);
+// Part of a ring's height that its directions lie at.
+const CONE_INSET: f32 = 1.75;
+// Cosine and sine of the golden section of a right angle.
+const RING_TURN: vec2<f32> = vec2(0.56463489, 0.82534081);
 // Alpha from which on it is not seen which part of a light is hidden.
 const AREA_ROUGH_ALPHA: f32 = 0.36;
 // Mean cosine below which a cone is not taken at its word.
@@ -30,14 +32,14 @@ fn area_gloss(r: Reflectance, s: AreaSurface, axis: vec3<f32>, cos_angle: f32, h
     let count = needed_directions(depth, r.alpha);
     // Gloss so wide that directions run into each other.
     let a2 = r.alpha * r.alpha;
-    let lobe = lobe_of(s, min(a2 + max(0.5 * depth / f32(count), 0.0), max(a2, 1.0)));
+    let lobe = lobe_of(s, min(a2 + max(0.25 * depth / f32(count), 0.0), max(a2, 1.0)));
     let basis = orthonormal_basis(axis);
     var sums = vec4(0.0);
     var over = 0.0;
     var turn = vec2(1.0, 0.0);
     for (var i = 0; i < count; i++) {
         let l = in_cone(axis, basis, depth, i, count, turn);
-        turn = turned(turn);
+        turn = turned(turn, i);
         sums += reflected_parts(s, lobe, l);
         over += max(dot(s.normal, l), 0.0);
     }
@@ -83,16 +85,19 @@ fn reflected_parts(s: AreaSurface, lobe: Lobe, l: vec3<f32>) -> vec4<f32> {
     return vec4(nl * (1.0 - miss), dv * (1.0 - miss), dv * miss, nl);
 }
 
-// The i-th of so many directions evenly in a cone, a golden spiral: `turn` is where it has come to. The twin is `cap_pattern`.
+// The i-th of so many directions evenly in a cone, four in a ring: `turn` is where it has come to. The twin is `cap_pattern`.
 fn in_cone(axis: vec3<f32>, basis: Basis, depth: f32, i: i32, count: i32, turn: vec2<f32>) -> vec3<f32> {
-    let height = select((f32(i) + 0.5) / f32(count), 0.0, count == 1);
+    let height = select((f32(4 * (i / 4)) + CONE_INSET) / f32(count), 0.0, count == 1);
     let below = depth * height;
     let radius = sqrt(max(below * (2.0 - below), 0.0));
     return basis.tangent * (radius * turn.x) + basis.bitangent * (radius * turn.y) + axis * (1.0 - below);
 }
 
-fn turned(turn: vec2<f32>) -> vec2<f32> {
-    return vec2(turn.x * GOLDEN_TURN.x - turn.y * GOLDEN_TURN.y, turn.x * GOLDEN_TURN.y + turn.y * GOLDEN_TURN.x);
+// A right angle on, and after the last of a ring to where the next begins.
+fn turned(turn: vec2<f32>, i: i32) -> vec2<f32> {
+    let on = vec2(-turn.y, turn.x);
+    let next = vec2(on.x * RING_TURN.x - on.y * RING_TURN.y, on.x * RING_TURN.y + on.y * RING_TURN.x);
+    return select(on, next, i % 4 == 3);
 }
 
 // Directions that stand for a cone of that 1 − cos a on a surface of that alpha.

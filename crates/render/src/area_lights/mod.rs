@@ -14,7 +14,7 @@ pub(crate) mod table;
 mod tests;
 
 use dapple_scene::ShadingPoint;
-use dapple_scene::area_lights::{AreaLights, LightFigure, LightForm};
+use dapple_scene::area_lights::{AreaLights, LightFigure, LightForm, luminance};
 use dapple_store::light_visibility::SeenLight;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -46,6 +46,18 @@ struct Entry {
     /// Of a ball that holds it.
     center: Vec3,
     radius: f32,
+}
+
+/// A light as a point: see [`AreaLightTable::spots`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Spot {
+    pub(crate) light: u32,
+    pub(crate) center_world: Vec3,
+    pub(crate) radius_m: f32,
+    /// Luminance of its radiance × radius².
+    pub(crate) strength: f32,
+    /// Unit normal of the only side that shines; zero if all do.
+    pub(crate) facing: Vec3,
 }
 
 impl AreaLightTable {
@@ -84,6 +96,28 @@ impl AreaLightTable {
         };
         let is_form = |entry: &Entry| !matches!(entry.figure.form, LightForm::Places(_));
         self.entries[slot].as_ref().is_some_and(is_form).then_some(slot)
+    }
+
+    /// What of each light that shines tells where it is and how bright, for places that it is far from.
+    pub(crate) fn spots(&self) -> impl Iterator<Item = Spot> {
+        let spot = |(light, entry): (&u32, &Option<Entry>)| {
+            let Entry { figure, center, radius } = entry.as_ref()?;
+            let facing = match &figure.form {
+                LightForm::Disc { normal, .. } | LightForm::Quad { normal, .. } if !figure.two_sided => {
+                    *normal
+                }
+                _ => Vec3::ZERO,
+            };
+            let strength = luminance(figure.radiance) * radius * radius;
+            (strength > 0.0 && strength.is_finite()).then_some(Spot {
+                light: *light,
+                center_world: *center,
+                radius_m: *radius,
+                strength,
+                facing,
+            })
+        };
+        self.lights.iter().zip(&self.entries).filter_map(spot)
     }
 
     /// Whether no light shines.

@@ -1,6 +1,7 @@
 //! The table of lights as texels of floats, as `arrival.wgsl` reads it.
 
 use dapple_scene::area_lights::LightForm;
+use dapple_store::cones::LightSet;
 use glam::Vec3;
 
 use super::{AreaLightTable, Entry, MAX_PLACES, MAX_TRIANGLES};
@@ -16,18 +17,22 @@ const DISC: f32 = 2.0;
 const QUAD: f32 = 3.0;
 const TRIANGLES: f32 = 4.0;
 const PLACES: f32 = 5.0;
+/// What a light's class counts beside them.
+const FORMS: f32 = 8.0;
 
 impl AreaLightTable {
     /// Row by row; as many rows as [`AreaLightTable::lights`].
     ///
-    /// A row: centre and radius of a ball that holds the light; radiance and form; normal, or number of parts and whether all shine alike, and
+    /// A row: centre and radius of a ball that holds the light; radiance, form and class ([`LightSet::class_of`]); normal, or number of parts and whether all shine alike, and
     /// whether both sides do; then corners, or of each triangle its corners with one colour of its radiance each, or of each place position and
     /// area, normal, radiance.
     pub(crate) fn texels(&self) -> Vec<[f32; 4]> {
         let mut texels = vec![[0.0; 4]; self.entries.len() * TABLE_WIDTH];
-        for (row, entry) in texels.chunks_exact_mut(TABLE_WIDTH).zip(&self.entries) {
+        let rows = texels.chunks_exact_mut(TABLE_WIDTH);
+        for ((row, entry), light) in rows.zip(&self.entries).zip(&self.lights) {
             if let Some(entry) = entry {
                 write(row, entry);
+                row[1][3] += FORMS * LightSet::class_of(*light) as f32;
             }
         }
         texels

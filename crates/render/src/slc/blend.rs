@@ -1,13 +1,13 @@
 //! One sample's light: of the entries about it, by the shapes of lights that they see and by cones of the rest.
 
 use dapple_scene::ShadingPoint;
-use dapple_store::cones::{ConeEntry, MOST_MOMENT_CONES, PixelPlace, Reader, luminance};
+use dapple_store::cones::{ConeEntry, LightSet, MOST_MOMENT_CONES, PixelPlace, Reader, luminance};
 use glam::Vec3;
 
-use super::cap::{Cap, Ground, Lanes, Lens};
+use super::cap::{Cap, Ground, Lanes, Lens, Toward};
 use super::table::{CapTable, TableCap};
-use super::{Blending, Caps, SlcShading};
-use crate::area_lights::{Arrival, ROUGH_ALPHA, Surface};
+use super::{Blending, Caps, Form, SlcShading};
+use crate::area_lights::{Arrival, ROUGH_ALPHA, Spot, Surface};
 
 /// Part of a light from which on its highlight is that of all of it: nothing is seen of what lacks.
 pub(super) const WHOLE: f32 = 0.97;
@@ -26,6 +26,9 @@ pub(super) struct Blender<'a, E> {
     lanes: Lanes,
     /// Parts of lights of the sample at hand; those of the one before are left in it.
     parts: [Seen; PARTS],
+    /// All lights from the sample at hand, and those of one cone.
+    toward: Vec<Toward>,
+    of_cone: Vec<Toward>,
 }
 
 /// An entry that a sample reads.
@@ -52,7 +55,16 @@ struct Seen {
 impl<'a, E: ConeEntry + Caps> Blender<'a, E> {
     pub(super) fn new(table: &'a CapTable<'a, E>, shading: &'a SlcShading) -> Self {
         let reader = Reader::new(table.cache, shading.look_up);
-        Blender { table, shading, reader, lanes: Lanes::new(), parts: [Seen::default(); PARTS] }
+        let parts = [Seen::default(); PARTS];
+        Blender {
+            table,
+            shading,
+            reader,
+            lanes: Lanes::new(),
+            parts,
+            toward: Vec::new(),
+            of_cone: Vec::new(),
+        }
     }
 
     /// Radiance that a sample reflects towards the viewer.
@@ -65,6 +77,10 @@ impl<'a, E: ConeEntry + Caps> Blender<'a, E> {
         let mut used = 0;
         let mut mean = Vec3::ZERO;
         let mut heaviest: Option<(f32, Vec3, &Read<'_>)> = None;
+        let (toward, of_cone) = (&mut self.toward, &mut self.of_cone);
+        toward.clear();
+        let shows_several =
+            is_smooth(point) && self.shading.form == Form::Ratio && !self.table.spots.is_empty();
         let each_apart = self.shading.blending == Blending::Cones || count == 1 || is_smooth(point);
         let widest = widest_part(point);
         // The light whose shape stands for a cone, what is seen of it, and for how much of the cone: the rest is the cone's.
@@ -98,6 +114,18 @@ impl<'a, E: ConeEntry + Caps> Blender<'a, E> {
                     }
                 }
                 let Some(cap) = rest_of(cone) else { continue };
+                if shows_several && cone.several != LightSet::NONE && lens.needed(&cap) > 1 {
+                    if toward.is_empty() {
+                        toward.extend(self.table.spots.iter().filter_map(|spot| toward_of(spot, point)));
+                    }
+                    of_cone.clear();
+                    of_cone.extend(toward.iter().filter_map(|light| of_cone_of(light, cone, &read.ground)));
+                    level(of_cone, &cone.cap, read.ground.normal);
+                    if !of_cone.is_empty() {
+                        lens.add_toward(&cap, &read.ground, read.weight, of_cone);
+                        continue;
+                    }
+                }
                 if each_apart {
                     lens.add(&cap, &read.ground, read.weight);
                 } else {
@@ -207,6 +235,61 @@ fn widest_part(point: &ShadingPoint) -> f32 {
     let chord = 1.2 * (0.04 + 0.6 * point.reflectance.alpha);
     0.5 * chord * chord
 }
+
+/// A light as seen from a place; none if it turns its back to it.
+#[inline(always)]
+fn toward_of(spot: &Spot, point: &ShadingPoint) -> Option<Toward> {
+    let offset = spot.center_world - point.position_world;
+    let distance2 = offset.length_squared().max(f32::MIN_POSITIVE);
+    let direction = offset / distance2.sqrt();
+    let facing = if spot.facing == Vec3::ZERO { 1.0 } else { -spot.facing.dot(direction) };
+    let sine2 = (spot.radius_m * spot.radius_m / distance2).min(1.0);
+    let weight = spot.strength * facing / distance2;
+    (weight > 0.0).then_some(Toward {
+        light: spot.light,
+        direction,
+        weight,
+        depth: 1.0 - (1.0 - sine2).sqrt(),
+    })
+}
+
+/// A light as far as a cone may be of it: among those of the cone, above the entry's horizon, and not far beside the cone.
+#[inline(always)]
+fn of_cone_of(light: &Toward, cone: &TableCap, ground: &Ground) -> Option<Toward> {
+    if !cone.several.may_hold(light.light) || ground.normal.dot(light.direction) <= 0.0 {
+        return None;
+    }
+    let far = (1.0 - cone.cap.direction.dot(light.direction)) / (1.0 - cone.cap.cos_angle).max(1e-6);
+    let near = (1.0 - far / BESIDE).max(0.0);
+    (near > 0.0).then_some(Toward { weight: light.weight * near * near, ..*light })
+}
+
+/// Weighs lights of a cone so that they are as high above the entry in the mean as its light is: what grazes a smooth surface outshines the rest.
+#[inline(always)]
+fn level(lights: &mut [Toward], cap: &Cap, normal: Vec3) {
+    let (mut all, mut mean, mut square) = (0.0, 0.0, 0.0);
+    for light in &*lights {
+        let height = normal.dot(light.direction);
+        all += light.weight;
+        mean += light.weight * height;
+        square += light.weight * height * height;
+    }
+    let mean = mean / all.max(f32::MIN_POSITIVE);
+    let spread = square / all.max(f32::MIN_POSITIVE) - mean * mean;
+    let lacks = normal.dot(cap.direction) * 0.5 * (1.0 + cap.cos_angle) - mean;
+    let slope = lacks / (spread + LEAST_HEIGHTS);
+    for light in lights {
+        let height = normal.dot(light.direction) - mean;
+        light.weight *= (1.0 + slope * height).clamp(1.0 / MOST_LEVELLED, MOST_LEVELLED);
+    }
+}
+
+/// Mean square of heights that says nothing of them.
+const LEAST_HEIGHTS: f32 = 1e-4;
+/// Most that a light counts more or less for its height.
+const MOST_LEVELLED: f32 = 20.0;
+/// How much larger than a cone of several lights that part of all directions is which any of them may lie in: three times as wide.
+const BESIDE: f32 = 9.0;
 
 /// Whether a surface shows where light comes from: one entry's cones cannot stand for another's.
 #[inline(always)]

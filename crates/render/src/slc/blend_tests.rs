@@ -180,6 +180,48 @@ fn smooth_surfaces_show_the_cones_of_each_entry() {
     assert_near(found(0.3, each), alone.iter().sum::<Vec3>() / 4.0);
 }
 
+/// Two lamps in one cone over a polished floor: their mirror images are where the lamps are, and of what stands between them there is none.
+#[test]
+fn smooth_surfaces_mirror_the_lights_of_a_cone_of_several() {
+    let mut stage = Stage::new();
+    let material = stage.add_material(Material { emissive_factor: Vec3::splat(8.0), ..matte(Vec3::ZERO) });
+    let lamps = [Vec3::new(0.9, 1.5, 0.0), Vec3::new(-0.7, 1.6, 0.2)];
+    for at in lamps {
+        let place = Affine3A::from_translation(at) * Affine3A::from_scale(Vec3::splat(0.1));
+        let light = stage.add(sphere(8, 12), material, place);
+        stage.scene.instances[light as usize].emitter = EmitterShape::Sphere;
+    }
+    let table = AreaLightTable::new(&AreaLights::new(&stage.scene, &stage.pose));
+    // Fluence of a small light is as its solid angle.
+    let one = |light: usize| {
+        let direction = lamps[light].normalize();
+        let energy = Vec3::splat(direction.y / lamps[light].length_squared());
+        MomentCone::from_cap(direction, 0.9999, energy, direction.y, LightSet::one(light as u32))
+    };
+    let apart = [one(0), one(1)];
+    let moment = apart[0].moment + apart[1].moment;
+    let fluence = apart[0].fluence + apart[1].fluence;
+    let energy = apart[0].energy + apart[1].energy;
+    let lights = apart[0].lights.union(apart[1].lights);
+    let together = MomentCone { energy, fluence, moment, lights, ..MomentCone::default() };
+    let (mut ours, mut caps, mut all) = (0.0, 0.0, 0.0);
+    for step in -16..=16 {
+        let to_viewer_world = Vec3::new(step as f32 * 0.08, 1.5, -0.1).normalize();
+        let point = ShadingPoint { to_viewer_world, ..floor(0.35) };
+        // By the cones of each: without shapes.
+        let exact = shaded_after(255, &point, [&apart; 4], None);
+        ours += shaded_after(255, &point, [&[together]; 4], Some(&table)).distance(exact);
+        caps += shaded_after(255, &point, [&[together]; 4], None).distance(exact);
+        all += exact.length();
+    }
+    println!("{} and {}", ours / all, caps / all);
+    assert!(ours < 0.05 * all && caps > 0.3 * all, "{} and {}", ours / all, caps / all);
+    // What may hold none of the lights is left to its cone.
+    let other = MomentCone { lights: LightSet::one(5).union(LightSet::one(7)), ..together };
+    let point = floor(0.35);
+    assert_eq!(shaded(&point, [&[other]; 4], Some(&table)), shaded(&point, [&[other]; 4], None));
+}
+
 /// Whatever changes, of the entries or of the lights, caps that are kept are those made anew.
 #[test]
 fn caps_that_are_kept_are_as_if_made_anew() {

@@ -3,6 +3,7 @@
 use std::f32::consts::FRAC_1_PI;
 
 use dapple_scene::ShadingPoint;
+use dapple_store::cones::GRAZING_COSINE;
 use dapple_store::points::orthonormal_basis;
 use glam::Vec3;
 
@@ -81,6 +82,8 @@ pub(super) struct Lanes {
     grazing: [f32; LANES],
     /// Squared roughness of the lobe that stands for the part of a cone about a direction.
     a2: [f32; LANES],
+    /// How much of a cone's light comes from a direction, 1 in the mean.
+    share: [f32; LANES],
     waiting: [Waiting; WAITING],
 }
 
@@ -95,9 +98,22 @@ impl Lanes {
             gloss: empty,
             grazing: empty,
             a2: empty,
+            share: empty,
             waiting: [Waiting::default(); WAITING],
         }
     }
+}
+
+/// A light of a cone of several, from where it is shaded.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Toward {
+    pub(super) light: u32,
+    /// Unit vector to its centre, world.
+    pub(super) direction: Vec3,
+    /// How much it brings beside others, of any unit.
+    pub(super) weight: f32,
+    /// 1 − the cosine of the angle that it is seen under, from its middle to its rim.
+    pub(super) depth: f32,
 }
 
 /// A surface about to be shaded, with cones that wait for it: directions of many cones are worked on at once, as most cones have one alone.
@@ -173,7 +189,7 @@ impl<'a> Lens<'a> {
 
     /// Directions that a cone needs on this surface.
     #[inline(always)]
-    fn needed(&self, cap: &Cap) -> u32 {
+    pub(super) fn needed(&self, cap: &Cap) -> u32 {
         match self.samples {
             Samples::Fixed(n) => n,
             Samples::Adaptive => {
@@ -189,7 +205,8 @@ impl<'a> Lens<'a> {
     fn spread<const N: usize>(&mut self, cap: &Cap, ground: &Ground, part: f32, pattern: &Pattern<N>) {
         let (first, axis) = (self.used, cap.direction);
         let lanes = first..first + N;
-        let Lanes { x, y, z, a2, .. } = &mut *self.lanes;
+        let Lanes { x, y, z, a2, share, .. } = &mut *self.lanes;
+        share[lanes.clone()].fill(1.0);
         // Each direction shows the part of the cone about it, 1 − cos s = (1 − cos a) / N, half of which half vectors turn by: as much variance as s² / 8.
         // The paper's show themselves alone.
         let wider = match self.form {
@@ -212,6 +229,9 @@ impl<'a> Lens<'a> {
                 z[i] = axis.z * up + tangent.z * along + bitangent.z * across;
             }
         }
+        if N > 1 && self.form == Form::Ratio {
+            lift::<N>(x, y, z, cap, ground.normal);
+        }
         let (over, above) = match self.form {
             Form::Fluence => (N as f32, N as f32),
             Form::Ratio => {
@@ -219,9 +239,9 @@ impl<'a> Lens<'a> {
                 let (mut cosines, mut open) = ([0.0f32; N], [0.0f32; N]);
                 for i in 0..N {
                     let above = n.x * x[i] + n.y * y[i] + n.z * z[i] > 0.0;
-                    let cosine = (s.x * x[i] + s.y * y[i] + s.z * z[i]).max(0.0);
+                    let cosine = (s.x * x[i] + s.y * y[i] + s.z * z[i]).max(GRAZING_COSINE);
                     cosines[i] = if above { cosine } else { 0.0 };
-                    open[i] = if cosines[i] > 0.0 { 1.0 } else { 0.0 };
+                    open[i] = if above { 1.0 } else { 0.0 };
                 }
                 // Light that reached the entry came from above its horizon, wherever rounding puts the cone.
                 (sum_of(&cosines).max(LEAST_COSINE * N as f32), sum_of(&open).max(LEAST_OPEN * N as f32))
@@ -232,6 +252,36 @@ impl<'a> Lens<'a> {
             Waiting { energy: cap.energy * (part / over), gloss, first, count: N };
         self.count += 1;
         self.used += N;
+    }
+
+    /// Adds a cone of an entry whose light comes from these directions instead of from all of its cap alike: at most as many as there are lanes.
+    #[inline(always)]
+    pub(super) fn add_toward(&mut self, cap: &Cap, ground: &Ground, part: f32, toward: &[Toward]) {
+        let n = toward.len().min(LANES);
+        if self.used + n > LANES || self.count == WAITING {
+            self.flush();
+        }
+        let total: f32 = toward[..n].iter().map(|light| light.weight).sum();
+        let scale = n as f32 / total.max(f32::MIN_POSITIVE);
+        let (mut over, mut above) = (0.0, 0.0);
+        for (lane, light) in (self.used..).zip(&toward[..n]) {
+            let Lanes { x, y, z, a2, share, .. } = &mut *self.lanes;
+            (x[lane], y[lane], z[lane]) = light.direction.into();
+            share[lane] = light.weight * scale;
+            // What it fills of all directions, half of which half vectors turn by.
+            a2[lane] = self.a2 + 0.25 * light.depth;
+            if ground.normal.dot(light.direction) > 0.0 {
+                let cosine = ground.normal_shading.dot(light.direction).max(GRAZING_COSINE);
+                over += share[lane] * cosine;
+                above += share[lane];
+            }
+        }
+        let (over, above) = (over.max(LEAST_COSINE * n as f32), above.max(LEAST_OPEN * n as f32));
+        let gloss = over / (above * cap.mean_cosine);
+        self.lanes.waiting[self.count] =
+            Waiting { energy: cap.energy * (part / over), gloss, first: self.used, count: n };
+        self.count += 1;
+        self.used += n;
     }
 
     /// Shades what is in the lanes.
@@ -248,15 +298,17 @@ impl<'a> Lens<'a> {
     #[allow(clippy::needless_range_loop)] // several lists of lanes at once
     #[inline(always)]
     fn flush_matte(&mut self) {
-        let Lanes { x, y, z, diffuse: cosines, waiting, .. } = &mut *self.lanes;
+        let Lanes { x, y, z, diffuse: cosines, share, waiting, .. } = &mut *self.lanes;
         let (n, s) = (self.point.normal_world, self.point.normal_shading_world);
         let steps = self.used.div_ceil(STEP);
-        let [x, y, z] = [x, y, z].map(|lane| &lane.as_chunks::<STEP>().0[..steps]);
-        for (((x, y), z), cosines) in x.iter().zip(y).zip(z).zip(cosines.as_chunks_mut::<STEP>().0) {
+        let [x, y, z, share] = [x, y, z, share].map(|lane| &lane.as_chunks::<STEP>().0[..steps]);
+        for ((((x, y), z), share), cosines) in
+            x.iter().zip(y).zip(z).zip(share).zip(cosines.as_chunks_mut::<STEP>().0)
+        {
             for i in 0..STEP {
                 let above = n.x * x[i] + n.y * y[i] + n.z * z[i] > 0.0;
                 let cosine = (s.x * x[i] + s.y * y[i] + s.z * z[i]).max(0.0);
-                cosines[i] = if above { cosine } else { 0.0 };
+                cosines[i] = if above { cosine * share[i] } else { 0.0 };
             }
         }
         let mut sum = Vec3::ZERO;
@@ -270,16 +322,16 @@ impl<'a> Lens<'a> {
     #[allow(clippy::needless_range_loop)] // several lists of lanes at once
     #[inline(always)]
     fn flush_glossy(&mut self) {
-        let Lanes { x, y, z, diffuse, gloss, grazing, a2: wide, waiting } = &mut *self.lanes;
+        let Lanes { x, y, z, diffuse, gloss, grazing, a2: wide, share, waiting } = &mut *self.lanes;
         let (n, s, v) =
             (self.point.normal_world, self.point.normal_shading_world, self.point.to_viewer_world);
         let (a2, nv, nv_signed, lambda_v) = (self.a2, self.n_dot_v, self.n_dot_v_signed, self.lambda_v);
         let steps = self.used.div_ceil(STEP);
-        let [x, y, z, wide] = [x, y, z, wide].map(|lane| &lane.as_chunks::<STEP>().0[..steps]);
+        let [x, y, z, wide, share] = [x, y, z, wide, share].map(|lane| &lane.as_chunks::<STEP>().0[..steps]);
         let [out_diffuse, out_gloss, out_grazing] =
             [&mut *diffuse, &mut *gloss, &mut *grazing].map(|lane| lane.as_chunks_mut::<STEP>().0);
         for step in 0..steps {
-            let (x, y, z, wide) = (&x[step], &y[step], &z[step], &wide[step]);
+            let (x, y, z, wide, share) = (&x[step], &y[step], &z[step], &wide[step], &share[step]);
             let (out_diffuse, out_gloss, out_grazing) =
                 (&mut out_diffuse[step], &mut out_gloss[step], &mut out_grazing[step]);
             for i in 0..STEP {
@@ -299,9 +351,9 @@ impl<'a> Lens<'a> {
                 let smith = nl_safe * lambda_v + nv * (nl_safe * nl_safe * (1.0 - a2) + a2).sqrt();
                 // D V n·l in one quotient.
                 let dv = (0.5 * FRAC_1_PI * wide[i]) * nl / (f * f * smith);
-                out_diffuse[i] = nl * (1.0 - f5);
-                out_gloss[i] = dv * (1.0 - f5);
-                out_grazing[i] = dv * f5;
+                out_diffuse[i] = share[i] * nl * (1.0 - f5);
+                out_gloss[i] = share[i] * dv * (1.0 - f5);
+                out_grazing[i] = share[i] * dv * f5;
             }
         }
         let (mut matte, mut glossy, mut edge) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
@@ -313,6 +365,27 @@ impl<'a> Lens<'a> {
         }
         let r = &self.point.reflectance;
         self.radiance += r.diffuse * (Vec3::ONE - r.f0) * FRAC_1_PI * matte + r.f0 * glossy + edge;
+    }
+}
+
+/// Brings directions of a cone that reach below an entry's horizon above it. Light there came from above, from as high as the mean of its directions, which is
+/// (1 + cos a) / 2 long, says: many lights along the horizon are not as far up as they are apart.
+#[inline(always)]
+pub(super) fn lift<const N: usize>(x: &mut [f32], y: &mut [f32], z: &mut [f32], cap: &Cap, n: Vec3) {
+    let mut heights = [0.0f32; N];
+    for i in 0..N {
+        heights[i] = n.x * x[i] + n.y * y[i] + n.z * z[i];
+    }
+    if heights.iter().all(|height| *height > 0.0) {
+        return;
+    }
+    let mean = (n.dot(cap.direction) * 0.5 * (1.0 + cap.cos_angle)).max(LEAST_COSINE);
+    let flatter = mean * N as f32 / sum_of(&heights.map(f32::abs)).max(f32::MIN_POSITIVE);
+    for i in 0..N {
+        let height = (heights[i].abs() * flatter).min(1.0);
+        let along = ((1.0 - height * height) / (1.0 - heights[i] * heights[i]).max(1e-6)).sqrt();
+        let up = height - heights[i] * along;
+        (x[i], y[i], z[i]) = (x[i] * along + n.x * up, y[i] * along + n.y * up, z[i] * along + n.z * up);
     }
 }
 

@@ -18,7 +18,7 @@ mod table;
 mod tests;
 
 use dapple_scene::ShadingPoint;
-use dapple_store::cones::{BoundingEntry, ConeCache, ConeEntry, LookUp, MomentEntry, PixelPlace};
+use dapple_store::cones::{BoundingEntry, ConeCache, ConeEntry, LightSet, LookUp, MomentEntry, PixelPlace};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -42,8 +42,8 @@ pub struct SeenPart {
 
 /// An entry whose cones can be shaded with.
 pub trait Caps {
-    /// Calls with every cone of it, and the part of which light it is where that is known.
-    fn each_cap(&self, cap: impl FnMut(Cap, Option<SeenPart>));
+    /// Calls with every cone of it, the lights that it is of, none where that is not known, and which part of a single one it is where that is known.
+    fn each_cap(&self, cap: impl FnMut(Cap, LightSet, Option<SeenPart>));
 }
 
 /// [`SeenPart::settled`] of an entry of so many samples: from 32 to 96. A ramp, since where lights move C goes up and down by the samples of an
@@ -54,7 +54,7 @@ fn settled(samples: u16) -> f32 {
 
 impl Caps for MomentEntry {
     #[inline]
-    fn each_cap(&self, mut cap: impl FnMut(Cap, Option<SeenPart>)) {
+    fn each_cap(&self, mut cap: impl FnMut(Cap, LightSet, Option<SeenPart>)) {
         for cone in self.cones() {
             let (direction, cos_angle) = cone.axis();
             let mean_cosine = cone.mean_cosine();
@@ -65,17 +65,18 @@ impl Caps for MomentEntry {
                 of_all: self.seen_of(cone.lights),
                 settled: settled(self.samples()),
             });
-            cap(Cap { direction, cos_angle, energy: cone.energy, mean_cosine }, seen);
+            cap(Cap { direction, cos_angle, energy: cone.energy, mean_cosine }, cone.lights, seen);
         }
     }
 }
 
 impl Caps for BoundingEntry {
     #[inline]
-    fn each_cap(&self, mut cap: impl FnMut(Cap, Option<SeenPart>)) {
+    fn each_cap(&self, mut cap: impl FnMut(Cap, LightSet, Option<SeenPart>)) {
         for cone in self.cones() {
             let cos_angle = libm::cosf(cone.angle);
-            cap(Cap { direction: cone.direction, cos_angle, energy: cone.energy, mean_cosine: 1.0 }, None);
+            let cone = Cap { direction: cone.direction, cos_angle, energy: cone.energy, mean_cosine: 1.0 };
+            cap(cone, LightSet::NONE, None);
         }
     }
 }

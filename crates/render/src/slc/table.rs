@@ -4,12 +4,12 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use dapple_store::cones::{BLOCK_TEXELS, ConeCache, ConeEntry, EntryId, EntrySite};
+use dapple_store::cones::{BLOCK_TEXELS, ConeCache, ConeEntry, EntryId, EntrySite, LightSet};
 use rayon::prelude::*;
 
 use super::blend::WHOLE;
 use super::{Cap, Caps, ConeLight, SeenPart};
-use crate::area_lights::AreaLightTable;
+use crate::area_lights::{AreaLightTable, Spot};
 
 /// Blocks of a chunk.
 const CHUNK_BLOCKS: usize = 16;
@@ -28,13 +28,16 @@ pub(super) struct TableCap {
     slot: u16,
     /// Whether all cones of it together see all of it.
     pub(super) is_whole: bool,
+    /// The lights that it is of, if these are several.
+    pub(super) several: LightSet,
 }
 
 /// No light of the table.
 const NO_SLOT: u16 = u16::MAX;
 
 impl TableCap {
-    fn new(cap: Cap, seen: Option<SeenPart>, lights: Option<&AreaLightTable>) -> TableCap {
+    fn new(cap: Cap, set: LightSet, seen: Option<SeenPart>, lights: Option<&AreaLightTable>) -> TableCap {
+        let several = if set.single().is_none() { set } else { LightSet::NONE };
         let of_light = seen.and_then(|seen| Some((seen, lights?.slot_of_form(seen.light)?)));
         match of_light {
             Some((seen, slot)) => TableCap {
@@ -43,8 +46,9 @@ impl TableCap {
                 settled: seen.settled.clamp(0.0, 1.0),
                 slot: slot as u16,
                 is_whole: seen.of_all >= WHOLE,
+                several,
             },
-            None => TableCap { cap, fraction: 0.0, settled: 0.0, slot: NO_SLOT, is_whole: false },
+            None => TableCap { cap, fraction: 0.0, settled: 0.0, slot: NO_SLOT, is_whole: false, several },
         }
     }
 
@@ -86,6 +90,8 @@ const _: () = assert!(CHUNK_TEXELS < NO_PLACE as usize);
 pub struct CapTable<'a, E> {
     pub(super) cache: &'a ConeCache<E>,
     pub(super) lights: Option<&'a AreaLightTable>,
+    /// The same, as points.
+    pub(super) spots: Vec<Spot>,
     chunks: Vec<Arc<Chunk>>,
 }
 
@@ -124,7 +130,8 @@ impl KeptCaps {
             kept.unwrap_or_else(|| Arc::new(Chunk::new(light, blocks)))
         };
         self.chunks = (0..count).into_par_iter().map(chunk).collect();
-        CapTable { cache: light.cache, lights: light.lights, chunks: self.chunks.clone() }
+        let spots = light.lights.map_or_else(Vec::new, |table| table.spots().collect());
+        CapTable { cache: light.cache, lights: light.lights, spots, chunks: self.chunks.clone() }
     }
 }
 
@@ -137,7 +144,7 @@ impl Chunk {
         for id in light.cache.ids_of_blocks(blocks) {
             let Some((site, entry)) = (light.place_of)(id).zip(light.cache.entry(id)) else { continue };
             let first = caps.len();
-            entry.each_cap(|cap, seen| caps.push(TableCap::new(cap, seen, light.lights)));
+            entry.each_cap(|cap, set, seen| caps.push(TableCap::new(cap, set, seen, light.lights)));
             let count = (caps.len() - first) as u32;
             place_of[id.index() % CHUNK_TEXELS] = entries.len() as u16;
             entries.push(TableEntry {

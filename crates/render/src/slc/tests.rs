@@ -3,10 +3,10 @@
 use std::f32::consts::{FRAC_1_PI, TAU};
 
 use dapple_scene::{Reflectance, ShadingPoint};
-use dapple_store::cones::{ConeSample, MomentParams};
+use dapple_store::cones::{ConeSample, GRAZING_COSINE, MomentParams};
 use glam::Vec3;
 
-use super::cap::{Ground, Lanes, Lens};
+use super::cap::{Ground, Lanes, Lens, lift};
 use super::*;
 
 /// A place on a floor, seen from a height of 45°.
@@ -40,21 +40,35 @@ fn ratio(samples: u32) -> SlcShading {
     SlcShading { samples: Samples::Fixed(samples), ..SlcShading::default() }
 }
 
-/// A cap of radiance 1 as the entry of a place with that normal keeps it: its irradiance, of what is above the horizon, by sums.
+/// A cap of radiance 1 as the entry of a place with that normal keeps it, by sums over what of it is above the horizon. What grazes the place counts a little more
+/// than its cosine.
 fn cap(direction: Vec3, angle: f32, normal: Vec3) -> Cap {
-    let (mut sum, mut count, mut open) = (0.0f64, 0, 0);
+    let (mut sum, mut count, mut open, mut moment) = (0.0f64, 0, 0, Vec3::ZERO);
+    each_direction(direction, angle, |w| {
+        count += 1;
+        if normal.dot(w) > 0.0 {
+            sum += f64::from(normal.dot(w).max(GRAZING_COSINE));
+            open += 1;
+            moment += w;
+        }
+    });
+    let (solid_angle, open) = (TAU * (1.0 - angle.cos()), open.max(1) as f32);
+    Cap {
+        direction: moment.normalize_or(direction),
+        cos_angle: 2.0 * moment.length() / open - 1.0,
+        energy: Vec3::splat((sum / f64::from(count)) as f32 * solid_angle),
+        mean_cosine: sum as f32 / open,
+    }
+}
+
+/// Irradiance of a cap of radiance 1, by sums.
+fn irradiance(direction: Vec3, angle: f32, normal: Vec3) -> f32 {
+    let (mut sum, mut count) = (0.0f64, 0);
     each_direction(direction, angle, |w| {
         sum += f64::from(normal.dot(w).max(0.0));
         count += 1;
-        open += i32::from(normal.dot(w) > 0.0);
     });
-    let solid_angle = TAU * (1.0 - angle.cos());
-    Cap {
-        direction,
-        cos_angle: angle.cos(),
-        energy: Vec3::splat((sum / f64::from(count)) as f32 * solid_angle),
-        mean_cosine: (sum / f64::from(open.max(1))) as f32,
-    }
+    (sum / f64::from(count)) as f32 * TAU * (1.0 - angle.cos())
 }
 
 /// Many directions evenly in a cap.
@@ -86,16 +100,70 @@ fn tilted(degrees: f32) -> Vec3 {
 #[test]
 fn diffuse_light_is_exact_with_any_number_of_directions() {
     let point = floor(0.6, 0.04, 1.0, false);
-    for (direction, angle) in [(Vec3::Y, 0.3), (tilted(50.0), 0.4), (tilted(88.0), 0.3), (tilted(100.0), 0.5)]
-    {
+    // Light that grazes the floor is what of it rings of a few directions say.
+    for (direction, angle, tolerance) in [
+        (Vec3::Y, 0.3, 1e-4),
+        (tilted(50.0), 0.4, 1e-4),
+        (tilted(88.0), 0.3, 0.06),
+        (tilted(100.0), 0.5, 0.06),
+    ] {
         let cap = cap(direction, angle, Vec3::Y);
+        let exact = irradiance(direction, angle, Vec3::Y) * 0.6 * FRAC_1_PI;
         for samples in [4, 8, 16, 64] {
             let found = shade(&point, &cap, Vec3::Y, &ratio(samples)).x;
-            let exact = cap.energy.x * 0.6 * FRAC_1_PI;
-            // Below the horizon the least cosine takes over.
-            let tolerance = if direction.y > 0.05 { 1e-4 } else { 1.0 };
             assert!((found - exact).abs() <= tolerance * exact, "{direction} {samples}: {found}, {exact}");
-            assert!(found <= exact * 1.0001, "never more than there is");
+        }
+    }
+}
+
+/// An entry's bump faces away from a light that the floor about it does not: a pixel beside has all of it.
+#[test]
+fn light_that_an_entry_faces_away_from_is_there_for_pixels_beside() {
+    for specular in [false, true] {
+        let point = floor(0.6, 0.5, 0.4, specular);
+        let direction = tilted(60.0);
+        let of =
+            |cosine: f32| Cap { direction, cos_angle: 1.0, energy: Vec3::splat(cosine), mean_cosine: cosine };
+        let shade = |cosine: f32, normal_shading: Vec3| {
+            let mut lanes = Lanes::new();
+            let mut lens = Lens::of(&point, &SlcShading::default(), &mut lanes);
+            lens.add(&of(cosine), &Ground { normal: Vec3::Y, normal_shading }, 1.0);
+            lens.radiance().x
+        };
+        let (away, facing) = (shade(GRAZING_COSINE, tilted(-45.0)), shade(0.5, Vec3::Y));
+        assert!((away - facing).abs() <= 1e-4 * facing, "{away}, {facing}");
+    }
+}
+
+/// Lights along the horizon, far apart, in one cone: its directions are no higher than they are.
+#[test]
+fn a_cone_that_reaches_below_the_horizon_is_as_high_as_its_light() {
+    for (degrees, apart) in [(2.0f32, 40.0f32), (10.0, 60.0), (20.0, 80.0)] {
+        let (low, half) = (degrees.to_radians(), apart.to_radians());
+        let lights = [-half, 0.0, half]
+            .map(|turn| Vec3::new(turn.cos() * low.cos(), low.sin(), turn.sin() * low.cos()));
+        let mean = lights.iter().sum::<Vec3>() / 3.0;
+        let cap = Cap {
+            direction: mean.normalize(),
+            cos_angle: 2.0 * mean.length() - 1.0,
+            energy: Vec3::ONE,
+            mean_cosine: low.sin(),
+        };
+        let (mut x, mut y, mut z) = ([0.0f32; 64], [0.0f32; 64], [0.0f32; 64]);
+        let mut i = 0;
+        each_direction(cap.direction, cap.cos_angle.acos(), |w| {
+            if i % 62 == 31 && i / 62 < 64 {
+                (x[i / 62], y[i / 62], z[i / 62]) = w.into();
+            }
+            i += 1;
+        });
+        assert!(y.iter().any(|height| *height < 0.0), "{degrees}: all above");
+        lift::<64>(&mut x, &mut y, &mut z, &cap, Vec3::Y);
+        let found = y.iter().sum::<f32>() / 64.0;
+        assert!((found - low.sin()).abs() < 1e-3, "{degrees}: {found}, {}", low.sin());
+        for i in 0..64 {
+            let direction = Vec3::new(x[i], y[i], z[i]);
+            assert!(direction.y >= 0.0 && direction.is_normalized(), "{direction}");
         }
     }
 }
@@ -186,7 +254,7 @@ fn irradiance_on_a_turned_surface_is_by_its_own_cosine() {
     entry.update(&[sample], 1, &MomentParams::default());
     for (normal, times) in [(Vec3::Y, 1.0), (direction, 2.0), (tilted(-60.0), 0.0), (-direction, 0.0)] {
         let (mut found, exact) = (Vec3::ZERO, sample.value * times);
-        entry.each_cap(|cap, _| found += cap.irradiance(normal));
+        entry.each_cap(|cap, _, _| found += cap.irradiance(normal));
         assert!(found.distance(exact) < 1e-5 + 0.02 * exact.length(), "{normal}: {found}, {exact}");
     }
 }

@@ -24,6 +24,46 @@ fn any_of(count: u32) -> f32 {
     (0.25 + 1.0 / count as f32).min(0.5)
 }
 
+/// How a place faces the light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facing {
+    /// Unit normal that light is by the cosine to. Zero in the open: all around is seen, with a cosine of 1.
+    pub normal_world: Vec3,
+    /// Unit normal of the surface itself, which may lie otherwise under its bumps.
+    pub ground_world: Vec3,
+    /// Cosine that light above the surface counts with at least, 0 … 1. 0: what `normal_world` faces away from does not count.
+    pub least_cosine: f32,
+}
+
+impl From<Vec3> for Facing {
+    /// By the cosine to a unit normal alone.
+    fn from(normal_world: Vec3) -> Facing {
+        Facing { normal_world, ground_world: normal_world, least_cosine: 0.0 }
+    }
+}
+
+impl Facing {
+    /// What light from a direction (unit vector) counts with; not above 0 if the place faces away from it.
+    #[inline]
+    pub fn cosine(&self, to_light_world: Vec3) -> f32 {
+        let cosine = self.normal_world.dot(to_light_world);
+        let is_above = cosine < self.least_cosine && self.ground_world.dot(to_light_world) > 0.0;
+        if is_above { self.least_cosine } else { cosine }
+    }
+
+    /// The largest of any direction within a ball at an offset, 0 … 1.
+    pub fn largest_cosine(&self, offset: Vec3, radius: f32) -> f32 {
+        self.within(offset, offset.length(), radius)
+    }
+
+    fn within(&self, offset: Vec3, distance: f32, radius: f32) -> f32 {
+        let cosine = cosine_within(self.normal_world, offset, distance, radius);
+        let is_above =
+            cosine < self.least_cosine && cosine_within(self.ground_world, offset, distance, radius) > 0.0;
+        if is_above { self.least_cosine } else { cosine }
+    }
+}
+
 /// Picks lights for one place. Made once and aimed at one place after the other.
 #[derive(Clone, Debug, Default)]
 pub struct Chooser {
@@ -40,15 +80,16 @@ impl Chooser {
         Chooser { pick, ..Chooser::default() }
     }
 
-    /// Prepares for samples at a place on a surface with that unit normal; a zero normal is a place in the open, which sees all around.
-    pub fn aim(&mut self, lights: &AreaLights<'_>, position_world: Vec3, normal_world: Vec3) {
+    /// Prepares for samples at a place on a surface that faces the light so, or with that unit normal.
+    pub fn aim(&mut self, lights: &AreaLights<'_>, position_world: Vec3, facing: impl Into<Facing>) {
+        let facing = facing.into();
         self.sums.clear();
         let mut sum = 0.0f32;
         match self.pick {
             Pick::Power => {}
             Pick::Uniform => self.sums.extend((1..=lights.len()).map(|n| n as f32)),
             Pick::Fluence => {
-                self.sums.extend((0..lights.len()).map(|i| lights.arriving(i, position_world, normal_world)));
+                self.sums.extend((0..lights.len()).map(|i| lights.arriving(i, position_world, facing)));
                 let (all, count) = self.sums.iter().fold((0.0f32, 0u32), |(all, count), arriving| {
                     (all + arriving, count + u32::from(*arriving > 0.0))
                 });
@@ -64,10 +105,10 @@ impl Chooser {
 
     /// Prepares for samples that several places share, each given as of [`Chooser::aim`]: the mean of the probabilities that each would have. A light that can
     /// arrive at any of them may be picked.
-    pub fn aim_among(
+    pub fn aim_among<F: Into<Facing>>(
         &mut self,
         lights: &AreaLights<'_>,
-        places_world: impl IntoIterator<Item = (Vec3, Vec3)>,
+        places_world: impl IntoIterator<Item = (Vec3, F)>,
     ) {
         if self.pick != Pick::Fluence {
             self.aim(lights, Vec3::ZERO, Vec3::ZERO);
@@ -76,8 +117,8 @@ impl Chooser {
         let mut own = std::mem::take(&mut self.own);
         own.clear();
         own.resize(lights.len(), 0.0);
-        for (position, normal) in places_world {
-            self.aim(lights, position, normal);
+        for (position, facing) in places_world {
+            self.aim(lights, position, facing);
             let Some(scale) =
                 self.sums.last().filter(|sum| **sum > 0.0 && sum.is_finite()).map(|sum| 1.0 / sum)
             else {
@@ -141,10 +182,6 @@ fn weight_of(sums: &[f32], light: usize) -> f32 {
 }
 
 /// Largest cosine of a unit normal to a direction within a ball at an offset: 1 inside it or without a normal, 0 below the horizon.
-pub fn largest_cosine(normal: Vec3, offset: Vec3, radius: f32) -> f32 {
-    cosine_within(normal, offset, offset.length(), radius)
-}
-
 fn cosine_within(normal: Vec3, offset: Vec3, distance: f32, radius: f32) -> f32 {
     if normal == Vec3::ZERO || distance <= radius {
         return 1.0;
@@ -160,9 +197,10 @@ fn cosine_within(normal: Vec3, offset: Vec3, distance: f32, radius: f32) -> f32 
 }
 
 impl AreaLights<'_> {
-    /// Estimate of the irradiance (luminance, W/m²) of a light at a place if nothing stands between: what its ball or plane would
-    /// give, with cosines at the most that its extent allows. Greater than 0 wherever any of it can arrive.
-    pub fn arriving(&self, light: usize, position_world: Vec3, normal_world: Vec3) -> f32 {
+    /// Estimate of the irradiance (luminance, W/m²) of a light at a place that faces it so, or with that unit normal, if nothing stands between: what its
+    /// ball or plane would give, with cosines at the most that its extent allows. Greater than 0 wherever any of it can arrive.
+    pub fn arriving(&self, light: usize, position_world: Vec3, facing: impl Into<Facing>) -> f32 {
+        let facing = facing.into();
         let Some(l) = self.lights.get(light) else {
             return self.environment.map_or(0.0, |(_, mean, _)| PI * luminance(mean).max(0.0));
         };
@@ -178,7 +216,7 @@ impl AreaLights<'_> {
         }
         let distance = distance2.sqrt();
         let cosine = |normal: Vec3, to: Vec3| cosine_within(normal, to, distance, radius);
-        let on_surface = cosine(normal_world, offset);
+        let on_surface = facing.within(offset, distance, radius);
         if on_surface <= 0.0 {
             return 0.0;
         }

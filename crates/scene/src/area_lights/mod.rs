@@ -15,7 +15,7 @@ mod tests;
 
 use glam::Vec3;
 
-pub use choose::{Chooser, Pick, largest_cosine};
+pub use choose::{Chooser, Facing, Pick};
 pub use environment::{Environment, EnvironmentError, MAX_SIDE};
 pub use figure::{LightFigure, LightForm, LightPlace, LightTriangle};
 pub use shape::EmitterShape;

@@ -92,6 +92,12 @@ fn sampled(name: &'static str, look_up: LookUp, params: SlcParams) -> Lit {
     lit
 }
 
+/// What rays find with the best sampler: means of single pictures by power are up to 0.3 % off in the village.
+fn best_truth(now: &Now<'_>, seen: &Seen, samples: u32) -> Vec<Vec3> {
+    let (pick, sequence) = (Pick::Fluence, Sequence::Lattice);
+    rays(now, &seen.points, &DirectParams { samples, pick, sequence, seed: 7, ..DirectParams::default() })
+}
+
 /// What rays find where nothing has moved yet.
 pub(crate) fn still_truth(stage: &Stage, samples: u32) -> Vec<Vec3> {
     let pose = stage.scene.pose(stage.time_s);
@@ -292,8 +298,7 @@ fn quality_over_a_walk() {
                 if step % 4 != 0 || !walks && step < steps {
                     continue;
                 }
-                let params = DirectParams { samples: 256, seed: 7, ..DirectParams::default() };
-                let truth = rays(&now, &seen.points, &params);
+                let truth = best_truth(&now, &seen, 256);
                 for (i, lit) in cones.iter().enumerate() {
                     found[i % count].push(stage.quality(&truth, &lit.picture));
                 }

@@ -8,6 +8,10 @@ pub const MOST_ENERGY: f32 = 1e15;
 /// An entry whose energy is below this, in the samples' unit, is dark. It is what keeps squares in the range of a float.
 pub(super) const LEAST_ENERGY: f32 = 1e-12;
 
+/// Cosine that light above the surface of an entry counts with at least in its irradiance ([`ConeSample::cosine`]). Pixels that read the entry may face light
+/// which its own bump faces away from; and what grazes it would weigh as little as it is bright in a mirror.
+pub const GRAZING_COSINE: f32 = 0.05;
+
 /// A cone that decayed below this is gone.
 pub(super) const GONE: f32 = 1e-14;
 

@@ -57,7 +57,12 @@ impl LightSet {
         }
     }
 
-    /// The set in 20 bits.
+    /// The class of a light, 0 … 18: of several, those of a class are not told apart.
+    pub fn class_of(light: u32) -> u32 {
+        light % CLASSES
+    }
+
+    /// The set in 20 bits: the index of a single light + 1; of several, the highest bit and one of each class ([`LightSet::class_of`]).
     pub fn bits(self) -> u32 {
         self.0
     }

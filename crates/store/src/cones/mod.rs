@@ -23,7 +23,7 @@ pub use cache::{
     Reader, Reads, Requests, TexelPlace, Touch, UpdateQueue, View,
 };
 pub use charting::{ChartPlace, Charting};
-pub use entry::{ConeEntry, ConeError, ConeSample, MOST_ENERGY, luminance};
+pub use entry::{ConeEntry, ConeError, ConeSample, GRAZING_COSINE, MOST_ENERGY, luminance};
 pub use key::{
     BACK, BLOCK_SIDE, BLOCK_TEXELS, BlockKey, COARSEST_LEVEL, FINEST_LEVEL, SLABS, TexelKey, level_of,
 };

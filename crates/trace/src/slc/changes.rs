@@ -225,12 +225,10 @@ impl Arrivals {
     pub(super) fn of(&mut self, light: usize, place: &EntryPlace, changes: &Changes<'_>) -> [f32; 2] {
         let Some(known) = self.0.get_mut(light) else { return [0.0; 2] };
         if known[1].is_nan() {
-            let now = changes.now.arriving(light, place.position_world, place.normal_shading_world);
-            let stays = !changes.lights[light]
-                && place.position_before_world == place.position_world
-                && place.normal_shading_before_world == place.normal_shading_world;
-            let (position, normal) = (place.position_before_world, place.normal_shading_before_world);
-            let before = if stays { now } else { changes.before.arriving(light, position, normal) };
+            let now = changes.now.arriving(light, place.position_world, place.facing());
+            let stays = !changes.lights[light] && place.is_still();
+            let (position, facing) = (place.position_before_world, place.facing_before());
+            let before = if stays { now } else { changes.before.arriving(light, position, facing) };
             *known = [before, now];
         }
         *known

@@ -1,6 +1,6 @@
 //! Cones that follow lights which moved, before they are updated by rays.
 
-use dapple_scene::area_lights::{AreaLights, largest_cosine};
+use dapple_scene::area_lights::{AreaLights, Facing};
 use dapple_scene::glam::Vec3;
 use dapple_store::cones::{LightSet, MOST_MOMENT_CONES, MomentEntry, ReAim};
 
@@ -14,8 +14,7 @@ pub(super) fn follow(
     changes: &Changes<'_>,
     arrivals: &mut Arrivals,
 ) {
-    let moved = place.position_before_world != place.position_world
-        || place.normal_shading_before_world != place.normal_shading_world;
+    let moved = !place.is_still();
     let turns = |set: LightSet| {
         moved || (0u32..).zip(&changes.lights).any(|(light, changed)| *changed && set.may_hold(light))
     };
@@ -30,11 +29,11 @@ pub(super) fn follow(
         let fluence = |lights: &AreaLights<'_>, position| lights.arriving(light, position, Vec3::ZERO);
         let fluence_before = fluence(changes.before, place.position_before_world);
         let fluence_after = if gone { 0.0 } else { fluence(changes.now, place.position_world) };
-        let before = fluence_before * mean_cosine(place.normal_shading_before_world, a, then.1);
-        let after = fluence_after * mean_cosine(place.normal_shading_world, b, now.1);
+        let before = fluence_before * mean_cosine(&place.facing_before(), a, then.1);
+        let after = fluence_after * mean_cosine(&place.facing(), b, now.1);
         // What a cone has of fluence came from above the horizon.
-        let fluence_before = fluence_before * part_above(place.normal_shading_before_world, a, then.1);
-        let fluence_after = fluence_after * part_above(place.normal_shading_world, b, now.1);
+        let fluence_before = fluence_before * part_above(place.normal_before_world, a, then.1);
+        let fluence_after = fluence_after * part_above(place.normal_world, b, now.1);
         if before <= 0.0 || then.1 <= 0.0 {
             continue;
         }
@@ -44,7 +43,7 @@ pub(super) fn follow(
             to,
             energy_ratio: after / before,
             fluence_ratio: fluence_after / fluence_before,
-            most_cosine: largest_cosine(place.normal_shading_world, b, now.1),
+            most_cosine: place.facing().largest_cosine(b, now.1),
             size_ratio,
         };
         entry.re_aim(set, &aim);
@@ -127,19 +126,20 @@ const MOST_GROWTH: f32 = 4.0;
 /// Spread of directions that counts as none.
 const LEAST_SPREAD: f32 = 1e-3;
 
-/// Mean cosine to a normal of light from a ball at an offset: that to its centre while all of it is above the horizon, and from there on falling
-/// to 0 with what is left above.
-fn mean_cosine(normal: Vec3, offset: Vec3, radius: f32) -> f32 {
+/// Mean cosine of light from a ball at an offset: that to its centre while all of it is above the horizon, and from there on falling with what is left
+/// above; no less than what grazes the place counts with.
+fn mean_cosine(facing: &Facing, offset: Vec3, radius: f32) -> f32 {
     let distance = offset.length();
     if distance <= radius {
         return 1.0;
     }
-    let (cosine, sine) = (normal.dot(offset) / distance, radius / distance);
+    let (cosine, sine) = (facing.normal_world.dot(offset) / distance, radius / distance);
     if cosine >= sine {
         return cosine;
     }
     let above = (cosine + sine).max(0.0);
-    above * above / (4.0 * sine.max(f32::MIN_POSITIVE))
+    let least = facing.least_cosine * part_above(facing.ground_world, offset, radius);
+    (above * above / (4.0 * sine.max(f32::MIN_POSITIVE))).max(least)
 }
 
 /// Part of a ball at an offset that is above the horizon, by its height; what is less than a tenth counts as that, since ratios of it say nothing.

@@ -23,7 +23,7 @@ mod visibility;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use dapple_scene::area_lights::{AreaLights, Chooser, LightSample, Pick};
+use dapple_scene::area_lights::{AreaLights, Chooser, Facing, LightSample, Pick};
 use dapple_scene::glam::Vec3;
 use dapple_store::cones::{
     BLOCK_SIDE, BLOCK_TEXELS, ConeCache, ConeEntry, ConeSample, EntryId, HiddenSample, MomentEntry,
@@ -291,10 +291,10 @@ enum Fate {
     Hidden(HiddenSample),
 }
 
-/// What a place makes of a sample; `None` if it faces away from it.
-fn judge(sample: &LightSample, normal: Vec3, faced: Vec3, with_cosine: bool) -> Option<Fate> {
+/// What a place with this normal of its triangle makes of a sample; `None` if it faces away from it.
+fn judge(sample: &LightSample, normal: Vec3, facing: &Facing, with_cosine: bool) -> Option<Fate> {
     let LightSample { light, to_light_world: direction, .. } = *sample;
-    let cosine = faced.dot(direction);
+    let cosine = facing.cosine(direction);
     if cosine <= 0.0 {
         return None;
     }
@@ -307,10 +307,10 @@ fn judge(sample: &LightSample, normal: Vec3, faced: Vec3, with_cosine: bool) -> 
     })
 }
 
-/// The normal that light is by the cosine to. Light by the cosine to a surface that bumps turn is what the pixels there reflect; by that to the triangle under
+/// What light is by the cosine to. Light by the cosine to a surface that bumps turn is what the pixels there reflect; by that to the triangle under
 /// it, lights that it hardly faces would have next to no part in a cone, and bumps that face them would lack their light.
-fn faced(place: &EntryPlace, source: &Source) -> Vec3 {
-    if source.with_cosine { place.normal_shading_world } else { place.normal_world }
+fn facing_of(place: &EntryPlace, source: &Source) -> Facing {
+    if source.with_cosine { place.facing() } else { place.normal_world.into() }
 }
 
 /// Sends rays to lights from one place, which `chooser` is aimed at. Places on lights are chosen from where rays leave ([`offset_origin`]), so that a ray
@@ -334,7 +334,7 @@ fn take_samples(
         let Some(sample) = lights.sample(chooser, origin, draws.at(i)) else {
             continue;
         };
-        match judge(&sample, normal, faced(place, source), source.with_cosine) {
+        match judge(&sample, normal, &facing_of(place, source), source.with_cosine) {
             Some(Fate::Open(open)) => {
                 samples.push(open);
                 reaches.push(sample.reach());
@@ -360,6 +360,6 @@ fn take_samples(
 fn chooser_for(lights: &AreaLights<'_>, place: &EntryPlace, source: &Source) -> Chooser {
     let mut chooser = Chooser::new(source.pick);
     let origin = offset_origin(place.position_world, place.normal_world);
-    chooser.aim(lights, origin, faced(place, source));
+    chooser.aim(lights, origin, facing_of(place, source));
     chooser
 }

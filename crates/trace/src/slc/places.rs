@@ -1,8 +1,9 @@
 //! Where entries of the cache are in the world: what their triangles say ([Stadlbauer2023] sec. 2.1, *triangle lookup*).
 
+use dapple_scene::area_lights::Facing;
 use dapple_scene::glam::{Mat3, Vec3};
 use dapple_scene::{Pose, Scene};
-use dapple_store::cones::{BACK, ConeCache, ConeEntry, EntryId, TexelPlace, UpdateQueue};
+use dapple_store::cones::{BACK, ConeCache, ConeEntry, EntryId, GRAZING_COSINE, TexelPlace, UpdateQueue};
 use rayon::prelude::*;
 
 use super::changes::is_still;
@@ -18,8 +19,31 @@ pub struct EntryPlace {
     pub normal_shading_world: Vec3,
     /// Where it was.
     pub position_before_world: Vec3,
+    /// How its triangle's normal was turned.
+    pub normal_before_world: Vec3,
     /// How its shading normal was turned.
     pub normal_shading_before_world: Vec3,
+}
+
+impl EntryPlace {
+    /// How it faces the light that it keeps: by the shading normal. What that faces away from counts a little as well, as pixels beside have other bumps.
+    pub(super) fn facing(&self) -> Facing {
+        facing(self.normal_world, self.normal_shading_world)
+    }
+
+    /// How it did.
+    pub(super) fn facing_before(&self) -> Facing {
+        facing(self.normal_before_world, self.normal_shading_before_world)
+    }
+
+    /// Whether it is where it was, and turned as it was.
+    pub(super) fn is_still(&self) -> bool {
+        self.position_before_world == self.position_world && self.facing_before() == self.facing()
+    }
+}
+
+fn facing(ground_world: Vec3, normal_world: Vec3) -> Facing {
+    Facing { normal_world, ground_world, least_cosine: GRAZING_COSINE }
 }
 
 /// Places of a frame's queue.
@@ -84,10 +108,10 @@ impl EntryPlaces {
                 && let Some(index) = self.of_entry.get(texel.id.index())
                 && let Some(held) = self.places.get(*index as usize)
             {
-                let (position, normal) = (held.position_world, held.normal_shading_world);
                 return EntryPlace {
-                    position_before_world: position,
-                    normal_shading_before_world: normal,
+                    position_before_world: held.position_world,
+                    normal_before_world: held.normal_world,
+                    normal_shading_before_world: held.normal_shading_world,
                     ..*held
                 };
             }
@@ -99,13 +123,14 @@ impl EntryPlaces {
             };
             // Between two equal poses nothing is to be found out.
             let then = if stands(texel.instance) { None } else { at(before) };
-            let [position_before_world, _, normal_shading_before_world] =
+            let [position_before_world, normal_before_world, normal_shading_before_world] =
                 then.unwrap_or([position_world, normal_world, normal_shading_world]);
             EntryPlace {
                 position_world,
                 normal_world,
                 normal_shading_world,
                 position_before_world,
+                normal_before_world,
                 normal_shading_before_world,
             }
         };

@@ -1,7 +1,7 @@
 //! Samples of the entries of a square of blocks, which share places on lights: rays of one place on a light to many entries beside each other are
 //! hardly more work than a few to one.
 
-use dapple_scene::area_lights::{AreaLights, BEFORE_LIGHT, Chooser, LightSpot};
+use dapple_scene::area_lights::{AreaLights, BEFORE_LIGHT, Chooser, Facing, LightSpot};
 use dapple_scene::glam::Vec3;
 use dapple_store::cones::{
     BLOCK_SIDE, BLOCK_TEXELS, BlockKey, ConeSample, EntryId, HiddenSample, MomentEntry, QueuedBlock, Touch,
@@ -9,7 +9,7 @@ use dapple_store::cones::{
 };
 
 use super::{Drawn, EntryPlace, EntryPlaces, Fate, SlcParams, Source};
-use super::{chooser_for, faced, judge, site_of, take_samples};
+use super::{chooser_for, facing_of, judge, site_of, take_samples};
 use crate::bvh::{Tracer, offset_origin};
 use crate::direct::Draws;
 use crate::sampling::{hash, unit_interval};
@@ -154,7 +154,7 @@ pub(super) struct Member {
     /// Where rays end, above the surface.
     pub(super) origin: Vec3,
     normal: Vec3,
-    faced: Vec3,
+    facing: Facing,
     pub(super) drawn: Drawn,
     /// Samples of places of its own.
     own: Vec<(ConeSample, Vec3)>,
@@ -171,7 +171,17 @@ impl Member {
         let normal = place.normal_world;
         let origin = offset_origin(place.position_world, normal);
         let drawn = Drawn { samples: Vec::new(), hidden: Vec::new(), rays: 0 };
-        Member { at, name, count, taken, origin, normal, faced: faced(place, source), drawn, own: Vec::new() }
+        Member {
+            at,
+            name,
+            count,
+            taken,
+            origin,
+            normal,
+            facing: facing_of(place, source),
+            drawn,
+            own: Vec::new(),
+        }
     }
 
     /// Keeps a sample that nothing is in the way of, or what is known of one that something is.
@@ -195,7 +205,7 @@ pub(super) fn sample(
     members: &mut [Member],
 ) -> (u32, Chooser) {
     let mut chooser = Chooser::new(source.pick);
-    chooser.aim_among(lights, members.iter().map(|member| (member.origin, member.faced)));
+    chooser.aim_among(lights, members.iter().map(|member| (member.origin, member.facing)));
     let ball = ball_about(members);
     let draws = Draws::new(source.sequence, source.seed, site, 0, 1);
     // All go on from where the oldest is, and are moved there: who is younger would draw the same again when the oldest is not among them.
@@ -219,7 +229,7 @@ pub(super) fn sample(
             let u = [rest, moved(v, 0), moved(w, 1)];
             let Some(mut sample) = lights.sample_light(light, member.origin, u) else { continue };
             sample.density_per_sr *= probability;
-            match judge(&sample, member.normal, member.faced, source.with_cosine) {
+            match judge(&sample, member.normal, &member.facing, source.with_cosine) {
                 Some(Fate::Open(open)) => member.own.push((open, sample.reach())),
                 Some(Fate::Hidden(hidden)) => member.drawn.hidden.push(hidden),
                 None => {}
@@ -254,7 +264,7 @@ fn share<'a>(
         let Some(mut sample) = spot.seen_from(member.origin) else { continue };
         sample.density_per_sr *= probability;
         let distance = sample.distance_m;
-        match judge(&sample, member.normal, member.faced, source.with_cosine) {
+        match judge(&sample, member.normal, &member.facing, source.with_cosine) {
             Some(Fate::Open(sample)) => {
                 nearest = nearest.min(distance);
                 reaches[count] = member.origin;

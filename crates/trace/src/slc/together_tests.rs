@@ -47,6 +47,7 @@ fn members(center: Vec3, spacing: f32, count: u32) -> Vec<Member> {
                 normal_world: Vec3::Y,
                 normal_shading_world: Vec3::Y,
                 position_before_world: at,
+                normal_before_world: Vec3::Y,
                 normal_shading_before_world: Vec3::Y,
             };
             Member::new([0, i], i as u64, [count, 0], &place, &source)

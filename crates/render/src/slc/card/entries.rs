@@ -2,9 +2,11 @@
 //!
 //! An entry is [`ENTRY_TEXELS`] texels of four words. Two say where it is: position and normal; shading normal, and in one word cones, and whether it
 //! has samples. Of each cone two follow: energy and mean cosine; direction, cosine of its angle, part of its light that is seen through it,
-//! and in one word which light that is and what else a [`TableCap`] tells. Normals and directions are octahedral, 16 bits a coordinate.
+//! and in one word which light that is and what else a [`TableCap`] tells; of several lights, which classes these are of. Normals and directions are octahedral, 16 bits a coordinate.
 
-use dapple_store::cones::{BLOCK_TEXELS, BlockKey, ConeEntry, EntrySite, MOST_MOMENT_CONES, MomentEntry};
+use dapple_store::cones::{
+    BLOCK_TEXELS, BlockKey, ConeEntry, EntrySite, LightSet, MOST_MOMENT_CONES, MomentEntry,
+};
 use dapple_store::octahedral::flatten;
 use glam::Vec3;
 
@@ -31,6 +33,8 @@ const MOST_PROBES: usize = 64;
 const HAS_SAMPLES: u32 = 0x100;
 const IS_WHOLE: u32 = 1 << 31;
 const SETTLED: u32 = 0x7fff;
+/// In place of a light's: several, whose classes are in place of the part that is seen.
+const OF_SEVERAL: u32 = 0xffff;
 
 const _: () = assert!(ROW_TEXELS <= 2048 && ENTRY_TEXELS == 10);
 
@@ -119,6 +123,12 @@ fn write(out: &mut [Texel; ENTRY_TEXELS], site: &EntrySite, caps: &[TableCap], h
 fn cone_texels(cone: &TableCap) -> [Texel; 2] {
     let cap = &cone.cap;
     let [r, g, b] = cap.energy.to_array().map(f32::to_bits);
+    if cone.several != LightSet::NONE {
+        return [
+            [r, g, b, cap.mean_cosine.to_bits()],
+            [octahedral(cap.direction), cap.cos_angle.to_bits(), cone.several.bits(), OF_SEVERAL],
+        ];
+    }
     let light = cone.slot().map_or(0, |slot| {
         // The largest is 1 itself, so that what is settled leaves nothing.
         let settled = ((cone.settled * 32768.0 + 0.5) as u32).min(SETTLED);

@@ -109,7 +109,7 @@ struct ConeUniform {
     directions: i32,
     flags: u32,
     first_row: i32,
-    pad_a: u32,
+    lights: i32,
     pad_b: [u32; 2],
 }
 
@@ -120,6 +120,7 @@ pub struct ConePass {
     layout: wgpu::BindGroupLayout,
     uniform: wgpu::Buffer,
     lights: wgpu::Texture,
+    light_count: i32,
     entries: Entries,
     entry_table: wgpu::Texture,
     hash_table: wgpu::Texture,
@@ -148,6 +149,7 @@ impl ConePass {
                 mapped_at_creation: false,
             }),
             lights: float_table(gpu, "lights of cones", TABLE_WIDTH as u32, MAX_AREA_LIGHTS as u32),
+            light_count: 0,
             entries: Entries::default(),
             entry_table: word_table(gpu, "cones", (ROW_TEXELS as u32, 1, 2)),
             hash_table: word_table(gpu, "blocks of cones", (HASH_ROW_TEXELS as u32, 1, 1)),
@@ -167,6 +169,7 @@ impl ConePass {
         if !lights.is_empty() {
             write_rows(gpu, &self.lights, 0, &lights);
         }
+        self.light_count = (lights.len() / TABLE_WIDTH) as i32;
         let sent = self.send_entries(gpu) + self.send_hash(gpu) + size_of_val(&lights[..]) as u64;
         match gpu.take_fault() {
             None => Ok(sent),
@@ -241,7 +244,8 @@ impl ConePass {
         for first in (0..height).step_by(rows as usize) {
             let end = (first + rows).min(height);
             self.write_samples(gpu, view, shading.look_up.bias, first..end);
-            let uniform = ConeUniform { first_row: first as i32, ..cone_uniform(shading, places) };
+            let (first_row, lights) = (first as i32, self.light_count);
+            let uniform = ConeUniform { first_row, lights, ..cone_uniform(shading, places) };
             gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             let background = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
@@ -345,7 +349,7 @@ fn cone_uniform(shading: &SlcShading, places: usize) -> ConeUniform {
         directions,
         flags,
         first_row: 0,
-        pad_a: 0,
+        lights: 0,
         pad_b: [0; 2],
     }
 }

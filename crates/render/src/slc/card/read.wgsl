@@ -12,7 +12,8 @@ struct ConeParams {
     flags: u32,
     // Of the picture, in `samples`.
     first_row: i32,
-    pad_a: u32,
+    // In the table of lights; 0: all by cones.
+    lights: i32,
     pad_b: vec2<u32>,
 }
 
@@ -191,6 +192,9 @@ fn site_of(entry: i32) -> Site {
     );
 }
 
+// In place of a light's number: a cone of several.
+const OF_SEVERAL: u32 = 0xffffu;
+
 // A cone of an entry, and the part of which light it is.
 struct Cone {
     energy: vec3<f32>,
@@ -199,6 +203,8 @@ struct Cone {
     cos_angle: f32,
     // Of a light in the table; -1 for light of none.
     slot: i32,
+    // A bit for each class of lights in it, if these are several.
+    several: u32,
     fraction: f32,
     is_whole: bool,
     settled: f32,
@@ -208,13 +214,15 @@ fn cone_of(entry: i32, index: i32) -> Cone {
     let light = entry_texel(entry, 2 + 2 * index);
     let shape = entry_texel(entry, 3 + 2 * index);
     let settled = (shape.w >> 16u) & 0x7fffu;
+    let is_of_several = shape.w == OF_SEVERAL;
     return Cone(
         bitcast<vec3<f32>>(light.xyz),
         bitcast<f32>(light.w),
         unflattened(shape.x),
         bitcast<f32>(shape.y),
-        i32(shape.w & 0xffffu) - 1,
-        bitcast<f32>(shape.z),
+        select(i32(shape.w & 0xffffu) - 1, -1, is_of_several),
+        select(0u, shape.z, is_of_several),
+        select(bitcast<f32>(shape.z), 0.0, is_of_several),
         (shape.w & 0x80000000u) != 0u,
         select(f32(settled) / 32768.0, 1.0, settled == 0x7fffu),
     );

@@ -5,7 +5,15 @@ const WHOLE: f32 = 0.97;
 // Part of a cone above an entry's horizon, and mean cosine there, below which it is not taken at its word.
 const LEAST_OPEN: f32 = 0.125;
 const LEAST_COSINE: f32 = 0.01;
+// Cosine that light above an entry's surface counts with at least.
+const GRAZING_COSINE: f32 = 0.05;
 const SMALLEST: f32 = 1.17549435e-38;
+
+// How much larger than a cone of several lights that part of all directions is which any of them may lie in, mean square of heights that says nothing of them, and
+// most that a light counts more or less for its height.
+const CONE_BESIDE: f32 = 9.0;
+const LEAST_HEIGHTS: f32 = 1e-4;
+const MOST_LEVELLED: f32 = 20.0;
 
 // A sample that is lit.
 struct ConePoint {
@@ -61,26 +69,55 @@ fn is_smooth(p: ConePoint) -> bool {
     return p.has_gloss && p.reflectance.alpha < AREA_ROUGH_ALPHA;
 }
 
+// What heights of a cone's directions over an entry's horizon are to be scaled by, if some of them are below it; 0 if none is.
+fn flattened(cone: Cone, n: vec3<f32>, basis: Basis, count: i32) -> f32 {
+    let depth = 1.0 - cone.cos_angle;
+    let upright = dot(n, cone.direction);
+    if (params.flags & CONE_IS_RATIO) == 0u || count == 1 || upright * upright > depth * (2.0 - depth) + 1e-3 && upright > 0.0 {
+        return 0.0;
+    }
+    var heights = 0.0;
+    var is_below = false;
+    var turn = vec2(1.0, 0.0);
+    for (var i = 0; i < count; i++) {
+        let height = dot(n, in_cone(cone.direction, basis, depth, i, count, turn));
+        turn = turned(turn, i);
+        heights += abs(height);
+        is_below = is_below || height <= 0.0;
+    }
+    let mean = max(upright * 0.5 * (1.0 + cone.cos_angle), LEAST_COSINE);
+    return select(0.0, mean * f32(count) / max(heights, SMALLEST), is_below);
+}
+
+// A direction that is so much higher or lower over the horizon, and above it.
+fn lifted(l: vec3<f32>, n: vec3<f32>, flatter: f32) -> vec3<f32> {
+    if flatter <= 0.0 {
+        return l;
+    }
+    let before = dot(n, l);
+    let height = min(abs(before) * flatter, 1.0);
+    let along = sqrt((1.0 - height * height) / max(1.0 - before * before, 1e-6));
+    return l * along + n * (height - before * along);
+}
+
 fn lit_by(p: ConePoint, before: Lit, cone: Cone, site: Site, part: f32) -> Lit {
     let depth = 1.0 - cone.cos_angle;
-    var count = params.directions;
-    if count == 0 {
-        count = needed_directions(depth, p.reflectance.alpha);
-    }
+    let count = directions_of(p, cone);
     let n = f32(count);
     let basis = orthonormal_basis(cone.direction);
     var lobe = lobe_of(p.surface, p.reflectance.alpha * p.reflectance.alpha);
     // Each direction shows the part of the cone about it; the paper's show themselves alone.
     lobe.wide_a2 += select(0.0, 0.25 * depth / n, (params.flags & CONE_IS_RATIO) != 0u);
+    let flatter = flattened(cone, site.normal, basis, count);
     var sums = vec4(0.0);
     // Of the entry: cosines, and directions above its horizon.
     var over = 0.0;
     var open = 0.0;
     var turn = vec2(1.0, 0.0);
     for (var i = 0; i < count; i++) {
-        let l = in_cone(cone.direction, basis, depth, i, count, turn);
-        turn = turned(turn);
-        let cosine = select(0.0, max(dot(site.normal_shading, l), 0.0), dot(site.normal, l) > 0.0);
+        let l = lifted(in_cone(cone.direction, basis, depth, i, count, turn), site.normal, flatter);
+        turn = turned(turn, i);
+        let cosine = select(0.0, max(dot(site.normal_shading, l), GRAZING_COSINE), dot(site.normal, l) > 0.0);
         over += cosine;
         open += select(0.0, 1.0, cosine > 0.0);
         sums += reflected_parts(p.surface, lobe, l);
@@ -100,6 +137,85 @@ fn lit_by(p: ConePoint, before: Lit, cone: Cone, site: Site, part: f32) -> Lit {
         before.gloss + energy * (of_gloss * sums.y),
         before.grazing + energy * (of_gloss * sums.z),
     );
+}
+
+// A light of a cone of several, from where it is shaded: how much it brings beside others, 1 − the cosine of the angle that it is seen under, and how high it
+// is above the entry.
+struct Toward {
+    direction: vec3<f32>,
+    weight: f32,
+    depth: f32,
+    height: f32,
+}
+
+fn toward(p: ConePoint, cone: Cone, site: Site, slot: i32) -> Toward {
+    let nothing = Toward(p.surface.normal, 0.0, 0.0, 0.0);
+    let ball = area_texel(slot, 0);
+    let shine = area_texel(slot, 1);
+    let form = area_form(shine);
+    if form == 0 || ((cone.several >> u32(i32(shine.w) / AREA_FORMS)) & 1u) == 0u {
+        return nothing;
+    }
+    let offset = ball.xyz - p.surface.position;
+    let distance_squared = max(dot(offset, offset), SMALLEST);
+    let direction = offset / sqrt(distance_squared);
+    let height = dot(site.normal, direction);
+    let side = area_texel(slot, 2);
+    let is_flat = form == AREA_DISC || form == AREA_QUAD;
+    let facing = select(1.0, -dot(side.xyz, direction), is_flat && side.w == 0.0);
+    let far = (1.0 - dot(cone.direction, direction)) / max(1.0 - cone.cos_angle, 1e-6);
+    let near = max(1.0 - far / CONE_BESIDE, 0.0);
+    let strength = luminance(shine.xyz) * ball.w * ball.w;
+    let weight = max(strength * facing / distance_squared, 0.0) * near * near;
+    let sine_squared = min(ball.w * ball.w / distance_squared, 1.0);
+    return Toward(direction, select(0.0, weight, height > 0.0), 1.0 - sqrt(1.0 - sine_squared), height);
+}
+
+// By the lights that it is of, those of them that lie about it; `lit_by` if there are none.
+fn lit_by_several(p: ConePoint, before: Lit, cone: Cone, site: Site, part: f32) -> Lit {
+    var all = 0.0;
+    var mean = 0.0;
+    var square = 0.0;
+    for (var slot = 0; slot < params.lights; slot++) {
+        let light = toward(p, cone, site, slot);
+        all += light.weight;
+        mean += light.weight * light.height;
+        square += light.weight * light.height * light.height;
+    }
+    if all <= 0.0 {
+        return lit_by(p, before, cone, site, part);
+    }
+    // As high above the entry in the mean as its light is: what grazes a smooth surface outshines the rest.
+    mean /= max(all, SMALLEST);
+    let spread = square / max(all, SMALLEST) - mean * mean;
+    let slope = (dot(site.normal, cone.direction) * 0.5 * (1.0 + cone.cos_angle) - mean) / (spread + LEAST_HEIGHTS);
+    var sums = vec4(0.0);
+    var over = 0.0;
+    all = 0.0;
+    for (var slot = 0; slot < params.lights; slot++) {
+        let light = toward(p, cone, site, slot);
+        if light.weight <= 0.0 {
+            continue;
+        }
+        let weight = light.weight * clamp(1.0 + slope * (light.height - mean), 1.0 / MOST_LEVELLED, MOST_LEVELLED);
+        var lobe = lobe_of(p.surface, p.reflectance.alpha * p.reflectance.alpha);
+        lobe.wide_a2 += 0.25 * light.depth;
+        all += weight;
+        over += weight * max(dot(site.normal_shading, light.direction), GRAZING_COSINE);
+        sums += reflected_parts(p.surface, lobe, light.direction) * weight;
+    }
+    over = max(over, LEAST_COSINE * all);
+    let energy = cone.energy * (part / over);
+    let of_gloss = over / (all * cone.mean_cosine);
+    return Lit(
+        before.matte + energy * select(sums.w, sums.x, p.has_gloss),
+        before.gloss + energy * (of_gloss * sums.y),
+        before.grazing + energy * (of_gloss * sums.z),
+    );
+}
+
+fn directions_of(p: ConePoint, cone: Cone) -> i32 {
+    return select(params.directions, needed_directions(1.0 - cone.cos_angle, p.reflectance.alpha), params.directions == 0);
 }
 
 fn reflected_of(p: ConePoint, lit: Lit) -> vec3<f32> {
@@ -149,6 +265,7 @@ fn reflected_of_cones(p: ConePoint, place: Place) -> vec3<f32> {
     }
 
     let each_apart = (params.flags & CONE_EACH_APART) != 0u || kept == 1 || is_smooth(p);
+    let is_ratio = (params.flags & CONE_IS_RATIO) != 0u;
     let widest = widest_part(p);
     var lit = Lit(vec3(0.0), vec3(0.0), vec3(0.0));
     // As many as four entries have cones.
@@ -191,7 +308,9 @@ fn reflected_of_cones(p: ConePoint, place: Place) -> vec3<f32> {
                 continue;
             }
             cone.energy *= 1.0 - share;
-            if each_apart {
+            if is_smooth(p) && is_ratio && cone.several != 0u && directions_of(p, cone) > 1 {
+                lit = lit_by_several(p, lit, cone, site, near[i]);
+            } else if each_apart {
                 lit = lit_by(p, lit, cone, site, near[i]);
             } else {
                 let cosine = max(dot(p.surface.normal, cone.direction), 0.0) * 0.5 * (1.0 + cone.cos_angle);

@@ -175,7 +175,7 @@ fn the_module_is_valid_within_webgl2_and_laid_out_like_its_mirror() {
         ("directions", offset_of!(ConeUniform, directions)),
         ("flags", offset_of!(ConeUniform, flags)),
         ("first_row", offset_of!(ConeUniform, first_row)),
-        ("pad_a", offset_of!(ConeUniform, pad_a)),
+        ("lights", offset_of!(ConeUniform, lights)),
         ("pad_b", offset_of!(ConeUniform, pad_b)),
     ];
     check_struct(&module, "ConeParams", size_of::<ConeUniform>(), &members).unwrap();

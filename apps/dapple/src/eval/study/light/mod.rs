@@ -133,7 +133,7 @@ impl Quality {
         self.ssim += ssim(width, height, &luma(&a.pixels), &luma(&b.pixels))?;
         self.flip +=
             flip(width, height, a.pixels.as_flattened(), b.pixels.as_flattened(), PIXELS_PER_DEGREE)?.mean;
-        self.bias += bias(truth, found);
+        self.bias += bias(width, truth, found);
         self.count += 1.0;
         Ok(())
     }
@@ -158,14 +158,22 @@ impl Quality {
 /// Most of a channel at pixels whose means are compared: a lamp itself, its mirror image, or a wall beside it would hide all else.
 const BRIGHTEST: f32 = 4.0;
 
-/// How much brighter the mean luminance is than the truth's, parts, over pixels that are no brighter in truth than [`BRIGHTEST`]. What is
+/// Pixels about a brighter one that are left out with it, in rows and columns: blurred, its light falls on those beside, and would be held against them.
+const BESIDE: usize = 1;
+
+/// How much brighter the mean luminance is than the truth's, parts, over pixels that are neither brighter in truth than [`BRIGHTEST`] nor beside one that is. What is
 /// found there is taken as it is: cut to what a display can show, noise would look like a lack of light.
-fn bias(truth: &[Vec3], found: &[Vec3]) -> f64 {
+fn bias(width: u32, truth: &[Vec3], found: &[Vec3]) -> f64 {
+    let side = width as usize;
+    let is_bright = |pixel: &Vec3| pixel.max_element() > BRIGHTEST;
     let (mut all, mut more) = (0.0, 0.0);
-    for (truth, found) in truth.iter().zip(found) {
-        if truth.max_element() <= BRIGHTEST {
-            all += f64::from(luminance(*truth));
-            more += f64::from(luminance(*found - *truth));
+    for (i, (truth_here, found)) in truth.iter().zip(found).enumerate() {
+        let (x, y) = (i % side, i / side);
+        let mut rows = truth.chunks(side).skip(y.saturating_sub(BESIDE)).take(y.min(BESIDE) + BESIDE + 1);
+        let columns = x.saturating_sub(BESIDE)..(x + BESIDE + 1).min(side);
+        if !rows.any(|row| row[columns.clone()].iter().any(is_bright)) {
+            all += f64::from(luminance(*truth_here));
+            more += f64::from(luminance(*found - *truth_here));
         }
     }
     more / f64::max(all, 1e-12)
