@@ -87,7 +87,12 @@ fn reflected_parts(s: AreaSurface, lobe: Lobe, l: vec3<f32>) -> vec4<f32> {
 
 // The i-th of so many directions evenly in a cone, four in a ring: `turn` is where it has come to. The twin is `cap_pattern`.
 fn in_cone(axis: vec3<f32>, basis: Basis, depth: f32, i: i32, count: i32, turn: vec2<f32>) -> vec3<f32> {
-    let height = select((f32(4 * (i / 4)) + CONE_INSET) / f32(count), 0.0, count == 1);
+    return in_cone_from(axis, basis, depth, i, count, turn, CONE_INSET);
+}
+
+// With directions at another part of a ring's height.
+fn in_cone_from(axis: vec3<f32>, basis: Basis, depth: f32, i: i32, count: i32, turn: vec2<f32>, inset: f32) -> vec3<f32> {
+    let height = select((f32(4 * (i / 4)) + inset) / f32(count), 0.0, count == 1);
     let below = depth * height;
     let radius = sqrt(max(below * (2.0 - below), 0.0));
     return basis.tangent * (radius * turn.x) + basis.bitangent * (radius * turn.y) + axis * (1.0 - below);

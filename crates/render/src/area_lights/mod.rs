@@ -15,6 +15,7 @@ mod tests;
 
 use dapple_scene::ShadingPoint;
 use dapple_scene::area_lights::{AreaLights, LightFigure, LightForm, luminance};
+use dapple_store::cones::LightSet;
 use dapple_store::light_visibility::SeenLight;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -36,6 +37,8 @@ pub const MAX_PLACES: usize = 32;
 pub struct AreaLightTable {
     /// Ascending.
     lights: Vec<u32>,
+    /// A bit for each class ([`LightSet::class_of`]) of lights that are not shown: the environment, and those that there was no room for.
+    hidden_classes: u32,
     entries: Vec<Option<Entry>>,
 }
 
@@ -48,6 +51,9 @@ struct Entry {
     radius: f32,
 }
 
+/// Least of a channel of a light's colour.
+const LEAST_TINT: f32 = 0.02;
+
 /// A light as a point: see [`AreaLightTable::spots`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Spot {
@@ -56,6 +62,8 @@ pub(crate) struct Spot {
     pub(crate) radius_m: f32,
     /// Luminance of its radiance × radius².
     pub(crate) strength: f32,
+    /// Its colour, of luminance 1, with a little of every channel.
+    pub(crate) tint: Vec3,
     /// Unit normal of the only side that shines; zero if all do.
     pub(crate) facing: Vec3,
 }
@@ -77,6 +85,9 @@ impl AreaLightTable {
             (center.is_finite() && radius.is_finite()).then_some(Entry { figure, center, radius })
         };
         AreaLightTable {
+            hidden_classes: (0..lights.len())
+                .filter(|light| shown.binary_search(light).is_err())
+                .fold(0, |classes, light| classes | 1 << LightSet::class_of(light as u32)),
             entries: shown.iter().map(entry).collect(),
             lights: shown.iter().map(|light| *light as u32).collect(),
         }
@@ -98,6 +109,17 @@ impl AreaLightTable {
         self.entries[slot].as_ref().is_some_and(is_form).then_some(slot)
     }
 
+    /// Whether a set of several lights may hold one that is not shown.
+    pub(crate) fn may_lack(&self, several: LightSet) -> bool {
+        several.bits() & self.hidden_classes != 0
+    }
+
+    /// A bit for each class of lights that are not shown.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn hidden_classes(&self) -> u32 {
+        self.hidden_classes
+    }
+
     /// What of each light that shines tells where it is and how bright, for places that it is far from.
     pub(crate) fn spots(&self) -> impl Iterator<Item = Spot> {
         let spot = |(light, entry): (&u32, &Option<Entry>)| {
@@ -108,12 +130,16 @@ impl AreaLightTable {
                 }
                 _ => Vec3::ZERO,
             };
-            let strength = luminance(figure.radiance) * radius * radius;
-            (strength > 0.0 && strength.is_finite()).then_some(Spot {
+            let brightness = luminance(figure.radiance);
+            let (strength, tint) = (brightness * radius * radius, figure.radiance / brightness);
+            // Of a channel that none of some lights has, what is told to be theirs is not lost.
+            let tint = tint.max(Vec3::splat(LEAST_TINT));
+            (strength > 0.0 && strength.is_finite() && tint.is_finite()).then_some(Spot {
                 light: *light,
                 center_world: *center,
                 radius_m: *radius,
                 strength,
+                tint,
                 facing,
             })
         };

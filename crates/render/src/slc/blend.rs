@@ -114,7 +114,11 @@ impl<'a, E: ConeEntry + Caps> Blender<'a, E> {
                     }
                 }
                 let Some(cap) = rest_of(cone) else { continue };
-                if shows_several && cone.several != LightSet::NONE && lens.needed(&cap) > 1 {
+                if shows_several
+                    && cone.several != LightSet::NONE
+                    && lens.needed(&cap) >= LEAST_DIRECTIONS
+                    && self.table.lights.is_some_and(|table| !table.may_lack(cone.several))
+                {
                     if toward.is_empty() {
                         toward.extend(self.table.spots.iter().filter_map(|spot| toward_of(spot, point)));
                     }
@@ -244,11 +248,13 @@ fn toward_of(spot: &Spot, point: &ShadingPoint) -> Option<Toward> {
     let direction = offset / distance2.sqrt();
     let facing = if spot.facing == Vec3::ZERO { 1.0 } else { -spot.facing.dot(direction) };
     let sine2 = (spot.radius_m * spot.radius_m / distance2).min(1.0);
-    let weight = spot.strength * facing / distance2;
+    // Inside of its ball it is all around.
+    let weight = spot.strength * facing / distance2.max(spot.radius_m * spot.radius_m);
     (weight > 0.0).then_some(Toward {
         light: spot.light,
         direction,
         weight,
+        tint: spot.tint,
         depth: 1.0 - (1.0 - sine2).sqrt(),
     })
 }
@@ -288,6 +294,8 @@ fn level(lights: &mut [Toward], cap: &Cap, normal: Vec3) {
 const LEAST_HEIGHTS: f32 = 1e-4;
 /// Most that a light counts more or less for its height.
 const MOST_LEVELLED: f32 = 20.0;
+/// Directions from which on a cone of several lights is wide enough to be shaded as these.
+const LEAST_DIRECTIONS: u32 = 4;
 /// How much larger than a cone of several lights that part of all directions is which any of them may lie in: three times as wide.
 const BESIDE: f32 = 9.0;
 

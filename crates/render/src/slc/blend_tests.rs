@@ -184,9 +184,11 @@ fn smooth_surfaces_show_the_cones_of_each_entry() {
 #[test]
 fn smooth_surfaces_mirror_the_lights_of_a_cone_of_several() {
     let mut stage = Stage::new();
-    let material = stage.add_material(Material { emissive_factor: Vec3::splat(8.0), ..matte(Vec3::ZERO) });
     let lamps = [Vec3::new(0.9, 1.5, 0.0), Vec3::new(-0.7, 1.6, 0.2)];
-    for at in lamps {
+    // Of equal luminance.
+    let colors = [Vec3::new(2.0, 0.6, 0.5), Vec3::new(0.4, 0.8, 3.230_2)];
+    for (at, emissive_factor) in lamps.into_iter().zip(colors) {
+        let material = stage.add_material(Material { emissive_factor, ..matte(Vec3::ZERO) });
         let place = Affine3A::from_translation(at) * Affine3A::from_scale(Vec3::splat(0.1));
         let light = stage.add(sphere(8, 12), material, place);
         stage.scene.instances[light as usize].emitter = EmitterShape::Sphere;
@@ -195,7 +197,7 @@ fn smooth_surfaces_mirror_the_lights_of_a_cone_of_several() {
     // Fluence of a small light is as its solid angle.
     let one = |light: usize| {
         let direction = lamps[light].normalize();
-        let energy = Vec3::splat(direction.y / lamps[light].length_squared());
+        let energy = colors[light] * (direction.y / lamps[light].length_squared());
         MomentCone::from_cap(direction, 0.9999, energy, direction.y, LightSet::one(light as u32))
     };
     let apart = [one(0), one(1)];

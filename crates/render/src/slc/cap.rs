@@ -59,7 +59,7 @@ const LANES: usize = 64;
 /// Lanes of a step: what the compiler makes vectors of.
 const STEP: usize = 8;
 /// Cones that wait to be shaded together.
-const WAITING: usize = 32;
+const WAITING: usize = LANES;
 
 /// A cone whose directions lie in the lanes.
 #[derive(Clone, Copy, Default)]
@@ -82,8 +82,6 @@ pub(super) struct Lanes {
     grazing: [f32; LANES],
     /// Squared roughness of the lobe that stands for the part of a cone about a direction.
     a2: [f32; LANES],
-    /// How much of a cone's light comes from a direction, 1 in the mean.
-    share: [f32; LANES],
     waiting: [Waiting; WAITING],
 }
 
@@ -98,7 +96,6 @@ impl Lanes {
             gloss: empty,
             grazing: empty,
             a2: empty,
-            share: empty,
             waiting: [Waiting::default(); WAITING],
         }
     }
@@ -112,6 +109,8 @@ pub(super) struct Toward {
     pub(super) direction: Vec3,
     /// How much it brings beside others, of any unit.
     pub(super) weight: f32,
+    /// Its colour, of luminance 1, with a little of every channel.
+    pub(super) tint: Vec3,
     /// 1 − the cosine of the angle that it is seen under, from its middle to its rim.
     pub(super) depth: f32,
 }
@@ -205,8 +204,7 @@ impl<'a> Lens<'a> {
     fn spread<const N: usize>(&mut self, cap: &Cap, ground: &Ground, part: f32, pattern: &Pattern<N>) {
         let (first, axis) = (self.used, cap.direction);
         let lanes = first..first + N;
-        let Lanes { x, y, z, a2, share, .. } = &mut *self.lanes;
-        share[lanes.clone()].fill(1.0);
+        let Lanes { x, y, z, a2, .. } = &mut *self.lanes;
         // Each direction shows the part of the cone about it, 1 − cos s = (1 − cos a) / N, half of which half vectors turn by: as much variance as s² / 8.
         // The paper's show themselves alone.
         let wider = match self.form {
@@ -220,8 +218,10 @@ impl<'a> Lens<'a> {
         } else {
             let (tangent, bitangent) = orthonormal_basis(axis);
             let depth = 1.0 - cap.cos_angle;
+            // Lobes of the paper's form are not made wider, and rings lie in their middle.
+            let out = if self.form == Form::Fluence { 0.25 / N as f32 } else { 0.0 };
             for i in 0..N {
-                let below = depth * pattern.height[i];
+                let below = depth * (pattern.height[i] + out);
                 let (up, radius) = (1.0 - below, (below * (2.0 - below)).max(0.0).sqrt());
                 let (along, across) = (radius * pattern.cos[i], radius * pattern.sin[i]);
                 x[i] = axis.x * up + tangent.x * along + bitangent.x * across;
@@ -254,34 +254,36 @@ impl<'a> Lens<'a> {
         self.used += N;
     }
 
-    /// Adds a cone of an entry whose light comes from these directions instead of from all of its cap alike: at most as many as there are lanes.
+    /// Adds a cone of an entry whose light comes from these lights, each in its own colour, instead of from all of its cap alike: at most as many as there are lanes.
     #[inline(always)]
     pub(super) fn add_toward(&mut self, cap: &Cap, ground: &Ground, part: f32, toward: &[Toward]) {
         let n = toward.len().min(LANES);
-        if self.used + n > LANES || self.count == WAITING {
+        if self.used + n > LANES || self.count + n > WAITING {
             self.flush();
         }
-        let total: f32 = toward[..n].iter().map(|light| light.weight).sum();
-        let scale = n as f32 / total.max(f32::MIN_POSITIVE);
-        let (mut over, mut above) = (0.0, 0.0);
-        for (lane, light) in (self.used..).zip(&toward[..n]) {
-            let Lanes { x, y, z, a2, share, .. } = &mut *self.lanes;
+        let (mut over, mut all, mut tinted) = (0.0, 0.0, Vec3::ZERO);
+        for light in &toward[..n] {
+            let cosine = ground.normal_shading.dot(light.direction).max(GRAZING_COSINE);
+            all += light.weight;
+            over += light.weight * cosine;
+            tinted += light.tint * (light.weight * cosine);
+        }
+        // Lights that are not those which shine may all graze the entry, which its own light does not.
+        let most = over.max(0.5 * cap.mean_cosine * all);
+        let gloss = most / (all.max(f32::MIN_POSITIVE) * cap.mean_cosine);
+        let energy = cap.energy * (part * over / most.max(f32::MIN_POSITIVE));
+        let tinted = tinted.max(Vec3::splat(f32::MIN_POSITIVE));
+        for light in &toward[..n] {
+            let Lanes { x, y, z, a2, waiting, .. } = &mut *self.lanes;
+            let lane = self.used;
             (x[lane], y[lane], z[lane]) = light.direction.into();
-            share[lane] = light.weight * scale;
             // What it fills of all directions, half of which half vectors turn by.
             a2[lane] = self.a2 + 0.25 * light.depth;
-            if ground.normal.dot(light.direction) > 0.0 {
-                let cosine = ground.normal_shading.dot(light.direction).max(GRAZING_COSINE);
-                over += share[lane] * cosine;
-                above += share[lane];
-            }
+            let energy = energy * (light.tint * light.weight / tinted);
+            waiting[self.count] = Waiting { energy, gloss, first: lane, count: 1 };
+            self.count += 1;
+            self.used += 1;
         }
-        let (over, above) = (over.max(LEAST_COSINE * n as f32), above.max(LEAST_OPEN * n as f32));
-        let gloss = over / (above * cap.mean_cosine);
-        self.lanes.waiting[self.count] =
-            Waiting { energy: cap.energy * (part / over), gloss, first: self.used, count: n };
-        self.count += 1;
-        self.used += n;
     }
 
     /// Shades what is in the lanes.
@@ -298,17 +300,15 @@ impl<'a> Lens<'a> {
     #[allow(clippy::needless_range_loop)] // several lists of lanes at once
     #[inline(always)]
     fn flush_matte(&mut self) {
-        let Lanes { x, y, z, diffuse: cosines, share, waiting, .. } = &mut *self.lanes;
+        let Lanes { x, y, z, diffuse: cosines, waiting, .. } = &mut *self.lanes;
         let (n, s) = (self.point.normal_world, self.point.normal_shading_world);
         let steps = self.used.div_ceil(STEP);
-        let [x, y, z, share] = [x, y, z, share].map(|lane| &lane.as_chunks::<STEP>().0[..steps]);
-        for ((((x, y), z), share), cosines) in
-            x.iter().zip(y).zip(z).zip(share).zip(cosines.as_chunks_mut::<STEP>().0)
-        {
+        let [x, y, z] = [x, y, z].map(|lane| &lane.as_chunks::<STEP>().0[..steps]);
+        for (((x, y), z), cosines) in x.iter().zip(y).zip(z).zip(cosines.as_chunks_mut::<STEP>().0) {
             for i in 0..STEP {
                 let above = n.x * x[i] + n.y * y[i] + n.z * z[i] > 0.0;
                 let cosine = (s.x * x[i] + s.y * y[i] + s.z * z[i]).max(0.0);
-                cosines[i] = if above { cosine * share[i] } else { 0.0 };
+                cosines[i] = if above { cosine } else { 0.0 };
             }
         }
         let mut sum = Vec3::ZERO;
@@ -322,16 +322,16 @@ impl<'a> Lens<'a> {
     #[allow(clippy::needless_range_loop)] // several lists of lanes at once
     #[inline(always)]
     fn flush_glossy(&mut self) {
-        let Lanes { x, y, z, diffuse, gloss, grazing, a2: wide, share, waiting } = &mut *self.lanes;
+        let Lanes { x, y, z, diffuse, gloss, grazing, a2: wide, waiting } = &mut *self.lanes;
         let (n, s, v) =
             (self.point.normal_world, self.point.normal_shading_world, self.point.to_viewer_world);
         let (a2, nv, nv_signed, lambda_v) = (self.a2, self.n_dot_v, self.n_dot_v_signed, self.lambda_v);
         let steps = self.used.div_ceil(STEP);
-        let [x, y, z, wide, share] = [x, y, z, wide, share].map(|lane| &lane.as_chunks::<STEP>().0[..steps]);
+        let [x, y, z, wide] = [x, y, z, wide].map(|lane| &lane.as_chunks::<STEP>().0[..steps]);
         let [out_diffuse, out_gloss, out_grazing] =
             [&mut *diffuse, &mut *gloss, &mut *grazing].map(|lane| lane.as_chunks_mut::<STEP>().0);
         for step in 0..steps {
-            let (x, y, z, wide, share) = (&x[step], &y[step], &z[step], &wide[step], &share[step]);
+            let (x, y, z, wide) = (&x[step], &y[step], &z[step], &wide[step]);
             let (out_diffuse, out_gloss, out_grazing) =
                 (&mut out_diffuse[step], &mut out_gloss[step], &mut out_grazing[step]);
             for i in 0..STEP {
@@ -351,9 +351,9 @@ impl<'a> Lens<'a> {
                 let smith = nl_safe * lambda_v + nv * (nl_safe * nl_safe * (1.0 - a2) + a2).sqrt();
                 // D V n·l in one quotient.
                 let dv = (0.5 * FRAC_1_PI * wide[i]) * nl / (f * f * smith);
-                out_diffuse[i] = share[i] * nl * (1.0 - f5);
-                out_gloss[i] = share[i] * dv * (1.0 - f5);
-                out_grazing[i] = share[i] * dv * f5;
+                out_diffuse[i] = nl * (1.0 - f5);
+                out_gloss[i] = dv * (1.0 - f5);
+                out_grazing[i] = dv * f5;
             }
         }
         let (mut matte, mut glossy, mut edge) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);

@@ -123,7 +123,7 @@ pub struct ConeLight<'a, E, F> {
     pub cache: &'a ConeCache<E>,
     /// Where an entry is; those that it does not know are left out.
     pub place_of: F,
-    /// Lights of the moment: light that is known to be of one of them is shaded by that light's own shape, as much as is seen of it. `None`: all by cones.
+    /// Lights of the moment: light that is known to be of one of them is shaded by that light's own shape, as much as is seen of it, and on smooth surfaces that of several by where these are. `None`: all by cones.
     pub lights: Option<&'a AreaLightTable>,
 }
 

@@ -116,6 +116,23 @@ fn diffuse_light_is_exact_with_any_number_of_directions() {
     }
 }
 
+/// The paper's form divides by no cosines: directions have to have the cap's mean themselves.
+#[test]
+fn the_papers_cones_give_the_irradiance_of_their_caps() {
+    let point = floor(0.6, 0.04, 1.0, false);
+    for angle in [0.3f32, 0.8, 1.2] {
+        let energy = Vec3::splat(TAU * (1.0 - angle.cos()));
+        let cap = Cap { direction: Vec3::Y, cos_angle: angle.cos(), energy, mean_cosine: 1.0 };
+        // Of radiance 1: π sin² a.
+        let exact = 0.6 * angle.sin() * angle.sin();
+        for samples in [4, 8, 16, 64] {
+            let papers = SlcShading { form: Form::Fluence, ..ratio(samples) };
+            let found = shade(&point, &cap, Vec3::Y, &papers).x;
+            assert!((found - exact).abs() < 1e-3 * exact, "{angle} {samples}: {found}, {exact}");
+        }
+    }
+}
+
 /// An entry's bump faces away from a light that the floor about it does not: a pixel beside has all of it.
 #[test]
 fn light_that_an_entry_faces_away_from_is_there_for_pixels_beside() {

@@ -46,12 +46,15 @@ impl Facing {
     /// What light from a direction (unit vector) counts with; not above 0 if the place faces away from it.
     #[inline]
     pub fn cosine(&self, to_light_world: Vec3) -> f32 {
+        if self.normal_world == Vec3::ZERO {
+            return 1.0;
+        }
         let cosine = self.normal_world.dot(to_light_world);
         let is_above = cosine < self.least_cosine && self.ground_world.dot(to_light_world) > 0.0;
         if is_above { self.least_cosine } else { cosine }
     }
 
-    /// The largest of any direction within a ball at an offset, 0 … 1.
+    /// The largest of any direction within a ball at an offset, both in metres: 0 … 1.
     pub fn largest_cosine(&self, offset: Vec3, radius: f32) -> f32 {
         self.within(offset, offset.length(), radius)
     }

@@ -148,7 +148,7 @@ impl<'a> Changes<'a> {
         if self.has_moved(instance) {
             return Change { share: 1.0, hidden: true, new: 0.0 };
         }
-        // Cones hold light by the cosine to the shading normal.
+        // By what entries hold light by.
         let mut arriving = |light: usize| {
             let [before, now] = arrivals.of(light, place, self);
             before.max(now)

@@ -134,11 +134,12 @@ fn mean_cosine(facing: &Facing, offset: Vec3, radius: f32) -> f32 {
         return 1.0;
     }
     let (cosine, sine) = (facing.normal_world.dot(offset) / distance, radius / distance);
+    let height = facing.ground_world.dot(offset) / radius.max(f32::MIN_POSITIVE);
+    let least = facing.least_cosine * (0.5 + 0.5 * height).clamp(0.0, 1.0);
     if cosine >= sine {
-        return cosine;
+        return cosine.max(least);
     }
     let above = (cosine + sine).max(0.0);
-    let least = facing.least_cosine * part_above(facing.ground_world, offset, radius);
     (above * above / (4.0 * sine.max(f32::MIN_POSITIVE))).max(least)
 }
 

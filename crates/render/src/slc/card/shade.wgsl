@@ -14,6 +14,8 @@ const SMALLEST: f32 = 1.17549435e-38;
 const CONE_BESIDE: f32 = 9.0;
 const LEAST_HEIGHTS: f32 = 1e-4;
 const MOST_LEVELLED: f32 = 20.0;
+// Least of a channel of a light's colour.
+const LEAST_TINT: f32 = 0.02;
 
 // A sample that is lit.
 struct ConePoint {
@@ -73,7 +75,8 @@ fn is_smooth(p: ConePoint) -> bool {
 fn flattened(cone: Cone, n: vec3<f32>, basis: Basis, count: i32) -> f32 {
     let depth = 1.0 - cone.cos_angle;
     let upright = dot(n, cone.direction);
-    if (params.flags & CONE_IS_RATIO) == 0u || count == 1 || upright * upright > depth * (2.0 - depth) + 1e-3 && upright > 0.0 {
+    let is_above = depth < 1.0 && upright > 0.0 && (upright * upright > depth * (2.0 - depth) + 1e-3);
+    if ((params.flags & CONE_IS_RATIO) == 0u) || (count == 1) || is_above {
         return 0.0;
     }
     var heights = 0.0;
@@ -108,6 +111,8 @@ fn lit_by(p: ConePoint, before: Lit, cone: Cone, site: Site, part: f32) -> Lit {
     var lobe = lobe_of(p.surface, p.reflectance.alpha * p.reflectance.alpha);
     // Each direction shows the part of the cone about it; the paper's show themselves alone.
     lobe.wide_a2 += select(0.0, 0.25 * depth / n, (params.flags & CONE_IS_RATIO) != 0u);
+    // Lobes of the paper's form are not made wider, and rings lie in their middle.
+    let inset = select(2.0, CONE_INSET, (params.flags & CONE_IS_RATIO) != 0u);
     let flatter = flattened(cone, site.normal, basis, count);
     var sums = vec4(0.0);
     // Of the entry: cosines, and directions above its horizon.
@@ -115,7 +120,7 @@ fn lit_by(p: ConePoint, before: Lit, cone: Cone, site: Site, part: f32) -> Lit {
     var open = 0.0;
     var turn = vec2(1.0, 0.0);
     for (var i = 0; i < count; i++) {
-        let l = lifted(in_cone(cone.direction, basis, depth, i, count, turn), site.normal, flatter);
+        let l = lifted(in_cone_from(cone.direction, basis, depth, i, count, turn, inset), site.normal, flatter);
         turn = turned(turn, i);
         let cosine = select(0.0, max(dot(site.normal_shading, l), GRAZING_COSINE), dot(site.normal, l) > 0.0);
         over += cosine;
@@ -144,16 +149,18 @@ fn lit_by(p: ConePoint, before: Lit, cone: Cone, site: Site, part: f32) -> Lit {
 struct Toward {
     direction: vec3<f32>,
     weight: f32,
+    // Its colour, of luminance 1.
+    tint: vec3<f32>,
     depth: f32,
     height: f32,
 }
 
 fn toward(p: ConePoint, cone: Cone, site: Site, slot: i32) -> Toward {
-    let nothing = Toward(p.surface.normal, 0.0, 0.0, 0.0);
+    let nothing = Toward(p.surface.normal, 0.0, vec3(0.0), 0.0, 0.0);
     let ball = area_texel(slot, 0);
     let shine = area_texel(slot, 1);
     let form = area_form(shine);
-    if form == 0 || ((cone.several >> u32(i32(shine.w) / AREA_FORMS)) & 1u) == 0u {
+    if (form == 0) || ((cone.several >> u32(i32(shine.w) / AREA_FORMS)) & 1u) == 0u {
         return nothing;
     }
     let offset = ball.xyz - p.surface.position;
@@ -165,10 +172,16 @@ fn toward(p: ConePoint, cone: Cone, site: Site, slot: i32) -> Toward {
     let facing = select(1.0, -dot(side.xyz, direction), is_flat && side.w == 0.0);
     let far = (1.0 - dot(cone.direction, direction)) / max(1.0 - cone.cos_angle, 1e-6);
     let near = max(1.0 - far / CONE_BESIDE, 0.0);
-    let strength = luminance(shine.xyz) * ball.w * ball.w;
-    let weight = max(strength * facing / distance_squared, 0.0) * near * near;
+    let brightness = luminance(shine.xyz);
+    if brightness <= 0.0 {
+        return nothing;
+    }
+    let strength = brightness * ball.w * ball.w;
+    let tint = max(shine.xyz / brightness, vec3(LEAST_TINT));
+    // Inside of its ball it is all around.
+    let weight = max(strength * facing / max(distance_squared, ball.w * ball.w), 0.0) * near * near;
     let sine_squared = min(ball.w * ball.w / distance_squared, 1.0);
-    return Toward(direction, select(0.0, weight, height > 0.0), 1.0 - sqrt(1.0 - sine_squared), height);
+    return Toward(direction, select(0.0, weight, height > 0.0), tint, 1.0 - sqrt(1.0 - sine_squared), height);
 }
 
 // By the lights that it is of, those of them that lie about it; `lit_by` if there are none.
@@ -189,7 +202,10 @@ fn lit_by_several(p: ConePoint, before: Lit, cone: Cone, site: Site, part: f32) 
     mean /= max(all, SMALLEST);
     let spread = square / max(all, SMALLEST) - mean * mean;
     let slope = (dot(site.normal, cone.direction) * 0.5 * (1.0 + cone.cos_angle) - mean) / (spread + LEAST_HEIGHTS);
-    var sums = vec4(0.0);
+    var matte = vec3(0.0);
+    var gloss = vec3(0.0);
+    var grazing = vec3(0.0);
+    var tinted = vec3(0.0);
     var over = 0.0;
     all = 0.0;
     for (var slot = 0; slot < params.lights; slot++) {
@@ -200,17 +216,24 @@ fn lit_by_several(p: ConePoint, before: Lit, cone: Cone, site: Site, part: f32) 
         let weight = light.weight * clamp(1.0 + slope * (light.height - mean), 1.0 / MOST_LEVELLED, MOST_LEVELLED);
         var lobe = lobe_of(p.surface, p.reflectance.alpha * p.reflectance.alpha);
         lobe.wide_a2 += 0.25 * light.depth;
+        let parts = reflected_parts(p.surface, lobe, light.direction);
+        let cosine = max(dot(site.normal_shading, light.direction), GRAZING_COSINE);
+        let own = light.tint * weight;
         all += weight;
-        over += weight * max(dot(site.normal_shading, light.direction), GRAZING_COSINE);
-        sums += reflected_parts(p.surface, lobe, light.direction) * weight;
+        over += weight * cosine;
+        tinted += own * cosine;
+        matte += own * select(parts.w, parts.x, p.has_gloss);
+        gloss += own * parts.y;
+        grazing += own * parts.z;
     }
-    over = max(over, LEAST_COSINE * all);
-    let energy = cone.energy * (part / over);
-    let of_gloss = over / (all * cone.mean_cosine);
+    // Lights that are not those which shine may all graze the entry, which its own light does not.
+    let most = max(over, 0.5 * cone.mean_cosine * all);
+    let energy = cone.energy * (part * over / max(most, SMALLEST)) / max(tinted, vec3(SMALLEST));
+    let of_gloss = most / (max(all, SMALLEST) * cone.mean_cosine);
     return Lit(
-        before.matte + energy * select(sums.w, sums.x, p.has_gloss),
-        before.gloss + energy * (of_gloss * sums.y),
-        before.grazing + energy * (of_gloss * sums.z),
+        before.matte + energy * matte,
+        before.gloss + energy * (of_gloss * gloss),
+        before.grazing + energy * (of_gloss * grazing),
     );
 }
 
@@ -308,7 +331,7 @@ fn reflected_of_cones(p: ConePoint, place: Place) -> vec3<f32> {
                 continue;
             }
             cone.energy *= 1.0 - share;
-            if is_smooth(p) && is_ratio && cone.several != 0u && directions_of(p, cone) > 1 {
+            if is_smooth(p) && is_ratio && cone.several != 0u && (cone.several & params.hidden_classes) == 0u && directions_of(p, cone) > 1 {
                 lit = lit_by_several(p, lit, cone, site, near[i]);
             } else if each_apart {
                 lit = lit_by(p, lit, cone, site, near[i]);

@@ -112,7 +112,8 @@ fn entry(i: usize) -> MomentEntry {
     let cone = |k: usize| {
         let at = 10 * k;
         let light = LightSet::one((number(i, at) * 4.0) as u32);
-        let lights = if number(i, at + 1) < 0.2 { light.union(LightSet::one(9)) } else { light };
+        let other = LightSet::one((number(i, at + 9) * 3.0) as u32);
+        let lights = if number(i, at + 1) < 0.2 { light.union(LightSet::one(9)).union(other) } else { light };
         let seen = match number(i, at + 2) {
             v if v < 0.2 => 0.0,
             v if v < 0.6 => 1.0,
@@ -176,6 +177,7 @@ fn the_module_is_valid_within_webgl2_and_laid_out_like_its_mirror() {
         ("flags", offset_of!(ConeUniform, flags)),
         ("first_row", offset_of!(ConeUniform, first_row)),
         ("lights", offset_of!(ConeUniform, lights)),
+        ("hidden_classes", offset_of!(ConeUniform, hidden_classes)),
         ("pad_b", offset_of!(ConeUniform, pad_b)),
     ];
     check_struct(&module, "ConeParams", size_of::<ConeUniform>(), &members).unwrap();
