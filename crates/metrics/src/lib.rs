@@ -7,12 +7,14 @@
 //! | metric | better is | input |
 //! |---|---|---|
 //! | [`psnr()`], [`error_map()`] | higher, ∞ when equal | any number of channels, any range |
+//! | [`mean_bias()`] | 0 when equal | linear RGB, any range |
 //! | [`ssim()`], [`ssim_map()`] | higher, 1 when equal | luma, 0 … 1 |
 //! | [`flip()`] | lower, 0 when equal | sRGB, 8 bits a channel |
 //! | [`flip_hdr()`] | lower, 0 when equal | linear sRGB of any brightness |
 //! | [`Lpips::distance`] | lower, 0 when equal | sRGB, 8 bits a channel |
 //! | [`Flicker`], [`StillFlicker`] | lower, 0 when steady | pictures of a sequence, any range |
 
+mod bias;
 mod error;
 mod errors;
 mod flip;
@@ -23,6 +25,7 @@ mod temporal;
 #[cfg(test)]
 mod test_images;
 
+pub use bias::mean_bias;
 pub use error::MetricError;
 pub use errors::{PixelError, error_map};
 pub use flip::{Exposures, Flip, HdrFlip, PIXELS_PER_DEGREE, flip, flip_hdr, magma_srgb8};

@@ -115,7 +115,6 @@ impl AreaLightTable {
     }
 
     /// A bit for each class of lights that are not shown.
-    #[cfg(feature = "gpu")]
     pub(crate) fn hidden_classes(&self) -> u32 {
         self.hidden_classes
     }

@@ -77,10 +77,10 @@ impl<'a, E: ConeEntry + Caps> Blender<'a, E> {
         let mut used = 0;
         let mut mean = Vec3::ZERO;
         let mut heaviest: Option<(f32, Vec3, &Read<'_>)> = None;
-        let (toward, of_cone) = (&mut self.toward, &mut self.of_cone);
+        // All lights from here, if one of the cones asks for them.
+        let (toward, of_cone, mut has_looked) = (&mut self.toward, &mut self.of_cone, false);
         toward.clear();
-        let shows_several =
-            is_smooth(point) && self.shading.form == Form::Ratio && !self.table.spots.is_empty();
+        let shows_several = is_smooth(point) && self.shading.form == Form::Ratio;
         let each_apart = self.shading.blending == Blending::Cones || count == 1 || is_smooth(point);
         let widest = widest_part(point);
         // The light whose shape stands for a cone, what is seen of it, and for how much of the cone: the rest is the cone's.
@@ -114,12 +114,9 @@ impl<'a, E: ConeEntry + Caps> Blender<'a, E> {
                     }
                 }
                 let Some(cap) = rest_of(cone) else { continue };
-                if shows_several
-                    && cone.several != LightSet::NONE
-                    && lens.needed(&cap) >= LEAST_DIRECTIONS
-                    && self.table.lights.is_some_and(|table| !table.may_lack(cone.several))
-                {
-                    if toward.is_empty() {
+                if shows_several && cone.several != LightSet::NONE && lens.needed(&cap) >= LEAST_DIRECTIONS {
+                    if !has_looked {
+                        has_looked = true;
                         toward.extend(self.table.spots.iter().filter_map(|spot| toward_of(spot, point)));
                     }
                     of_cone.clear();
@@ -272,7 +269,7 @@ fn of_cone_of(light: &Toward, cone: &TableCap, ground: &Ground) -> Option<Toward
 
 /// Weighs lights of a cone so that they are as high above the entry in the mean as its light is: what grazes a smooth surface outshines the rest.
 #[inline(always)]
-fn level(lights: &mut [Toward], cap: &Cap, normal: Vec3) {
+pub(super) fn level(lights: &mut [Toward], cap: &Cap, normal: Vec3) {
     let (mut all, mut mean, mut square) = (0.0, 0.0, 0.0);
     for light in &*lights {
         let height = normal.dot(light.direction);

@@ -1,6 +1,6 @@
 //! Which light of entries is shaded by the shapes of lights, and that it is as much as they see.
 
-use dapple_scene::area_lights::AreaLights;
+use dapple_scene::area_lights::{AreaLights, Environment};
 use dapple_scene::{EmitterShape, Material, Mesh, Reflectance, ShadingPoint};
 use dapple_store::cones::{
     CacheParams, ChartPlace, ConeCache, EntrySite, LightSet, LookUp, MomentCone, MomentEntry, PixelPlace,
@@ -10,6 +10,8 @@ use dapple_store::light_visibility::SeenLight;
 use glam::{Affine3A, Vec3};
 use proptest::prelude::*;
 
+use super::blend::level;
+use super::cap::Toward;
 use super::*;
 use crate::area_lights::{AreaLightTable, shade_area_lights};
 use crate::testing::{Stage, matte, sphere};
@@ -218,10 +220,53 @@ fn smooth_surfaces_mirror_the_lights_of_a_cone_of_several() {
     }
     println!("{} and {}", ours / all, caps / all);
     assert!(ours < 0.05 * all && caps > 0.3 * all, "{} and {}", ours / all, caps / all);
-    // What may hold none of the lights is left to its cone.
+    // What may hold none of the lights is left to its cone, and what may hold the light of a sky, which no lamp mirrors.
+    let hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n\x80\x80\x80\x82\x80\x80\x80\x82";
+    let sky = Environment::from_hdr(hdr).unwrap();
+    let outdoors = AreaLights::new(&stage.scene, &stage.pose).with_environment(&sky, &stage.pose);
+    let outdoors = AreaLightTable::new(&outdoors);
+    let of_sky = MomentCone { lights: lights.union(LightSet::one(2)), ..together };
+    let by_cone = shaded(&floor(0.35), [&[together]; 4], None);
+    assert_eq!(shaded(&floor(0.35), [&[of_sky]; 4], Some(&outdoors)), by_cone);
+    assert!(shaded(&floor(0.35), [&[together]; 4], Some(&outdoors)) != by_cone);
     let other = MomentCone { lights: LightSet::one(5).union(LightSet::one(7)), ..together };
     let point = floor(0.35);
     assert_eq!(shaded(&point, [&[other]; 4], Some(&table)), shaded(&point, [&[other]; 4], None));
+}
+
+/// Lights of a cone are together as high as its light is, wherever the first guess has them.
+#[test]
+fn lights_of_a_cone_are_as_high_as_its_light() {
+    let light = |height: f32, weight: f32| {
+        let direction = Vec3::new((1.0 - height * height).sqrt(), height, 0.0);
+        Toward { direction, weight, tint: Vec3::ONE, ..Toward::default() }
+    };
+    let height_of = |lights: &[Toward]| {
+        let all: f32 = lights.iter().map(|light| light.weight).sum();
+        lights.iter().map(|light| light.weight * light.direction.y).sum::<f32>() / all
+    };
+    for truth in [[3.0, 1.0, 1.0], [1.0, 1.0, 2.0], [1.0, 4.0, 3.0]] {
+        let heights = [0.1, 0.35, 0.6];
+        let exact: Vec<Toward> =
+            heights.iter().zip(truth).map(|(height, weight)| light(*height, weight)).collect();
+        let mean = exact.iter().map(|light| light.direction * light.weight).sum::<Vec3>()
+            / exact.iter().map(|light| light.weight).sum::<f32>();
+        let cap = Cap {
+            direction: mean.normalize(),
+            cos_angle: 2.0 * mean.length() - 1.0,
+            energy: Vec3::ONE,
+            mean_cosine: mean.y,
+        };
+        let mut guess = heights.map(|height| light(height, 1.0));
+        level(&mut guess, &cap, Vec3::Y);
+        assert!((height_of(&guess) - mean.y).abs() < 2e-3, "{}, {}", height_of(&guess), mean.y);
+        assert!(guess.iter().all(|light| light.weight > 0.0));
+    }
+    // One alone has nowhere to go.
+    let mut alone = [light(0.3, 2.0)];
+    let above = Cap { direction: Vec3::Y, cos_angle: 0.9, energy: Vec3::ONE, mean_cosine: 0.95 };
+    level(&mut alone, &above, Vec3::Y);
+    assert!((height_of(&alone) - 0.3).abs() < 1e-6);
 }
 
 /// Whatever changes, of the entries or of the lights, caps that are kept are those made anew.

@@ -28,7 +28,7 @@ pub(super) struct TableCap {
     slot: u16,
     /// Whether all cones of it together see all of it.
     pub(super) is_whole: bool,
-    /// The lights that it is of, if these are several.
+    /// The lights that it is of, if these are several and all in the table of lights.
     pub(super) several: LightSet,
 }
 
@@ -37,7 +37,8 @@ const NO_SLOT: u16 = u16::MAX;
 
 impl TableCap {
     fn new(cap: Cap, set: LightSet, seen: Option<SeenPart>, lights: Option<&AreaLightTable>) -> TableCap {
-        let several = if set.single().is_none() { set } else { LightSet::NONE };
+        let is_shown = set.single().is_none() && lights.is_some_and(|table| !table.may_lack(set));
+        let several = if is_shown { set } else { LightSet::NONE };
         let of_light = seen.and_then(|seen| Some((seen, lights?.slot_of_form(seen.light)?)));
         match of_light {
             Some((seen, slot)) => TableCap {
@@ -99,8 +100,8 @@ pub struct CapTable<'a, E> {
 #[derive(Debug, Default)]
 pub struct KeptCaps {
     chunks: Vec<Arc<Chunk>>,
-    /// The lights that have forms, and their places in the table.
-    slots: Option<Vec<(u32, usize)>>,
+    /// What caps say of lights: those that have forms, their places in the table, and classes of those that are not in it.
+    shown: Option<(Vec<(u32, usize)>, u32)>,
 }
 
 impl KeptCaps {
@@ -111,12 +112,12 @@ impl KeptCaps {
         light: &ConeLight<'a, E, F>,
         changed_at: impl Fn(usize) -> u64 + Sync,
     ) -> CapTable<'a, E> {
-        let slots = light.lights.map(|table| {
-            let shown = table.lights().iter();
-            shown.filter_map(|light| Some((*light, table.slot_of_form(*light)?))).collect::<Vec<_>>()
+        let shown = light.lights.map(|table| {
+            let slots = table.lights().iter().filter_map(|light| Some((*light, table.slot_of_form(*light)?)));
+            (slots.collect::<Vec<_>>(), table.hidden_classes())
         });
-        if self.slots != slots {
-            (self.chunks, self.slots) = (Vec::new(), slots);
+        if self.shown != shown {
+            (self.chunks, self.shown) = (Vec::new(), shown);
         }
         let end = light.cache.end_block();
         let count = end.div_ceil(CHUNK_BLOCKS);

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use dapple_render::slc::{Blending, SlcShading};
+use dapple_scene::ShadingPoint;
 use dapple_scene::area_lights::Pick;
 use dapple_scene::glam::Vec3;
 use dapple_server::cones::{ConeStep, Now};
@@ -263,7 +264,8 @@ fn a_viewer_who_walks() {
     }
 }
 
-/// Prints quality and bias, means of two seeds and of six moments of a walk, and the largest bias of any of them; and the same once all has stood for 40 steps.
+/// Prints quality and bias, means of two seeds and of four moments of each of three walks, and the largest bias of any of them; and the same once all has stood for
+/// 40 steps in three places.
 #[test]
 #[ignore = "measures; minutes"]
 fn quality_over_a_walk() {
@@ -279,33 +281,15 @@ fn quality_over_a_walk() {
     };
     println!("| scene | | PSNR | SSIM | bias, % | largest |");
     for name in ["atrium-lamps", "village", "street", "hangar"] {
-        let stage = Stage::new(name, 0.3, [192, 108]);
-        for (walks, steps) in [(true, 24), (false, 40)] {
-            let mut cones: Vec<Lit> = (0..2).flat_map(|_| ways()).collect();
-            let count = cones.len() / 2;
-            for (i, lit) in cones.iter_mut().enumerate() {
-                lit.params.seed = (i / count) as u64;
+        for (walks, steps) in [(true, 16), (false, 40)] {
+            let mut found = vec![Vec::new(); ways().len()];
+            for start_s in [1.0, 6.0, 11.0] {
+                let stage = Stage { time_s: start_s, ..Stage::new(name, 0.3, [192, 108]) };
+                walk(&stage, (walks, steps), |_| (), ways, &mut found);
             }
-            let mut found = vec![Vec::new(); count];
-            let mut tracer = Tracer::new(&stage.scene, &stage.scene.pose(stage.time_s));
-            for step in 1..=steps {
-                let time_s = stage.time_s + if walks { f64::from(step) / 15.0 } else { 0.0 };
-                let pose = stage.scene.pose(time_s);
-                tracer.update(&stage.scene, &pose);
-                let now = Now { scene: &stage.scene, pose: &pose, tracer: &tracer, environment: None };
-                let seen = stage.see(&now);
-                cones.iter_mut().for_each(|lit| lit.step(&stage, &now, Some(&seen)));
-                if step % 4 != 0 || !walks && step < steps {
-                    continue;
-                }
-                let truth = best_truth(&now, &seen, 256);
-                for (i, lit) in cones.iter().enumerate() {
-                    found[i % count].push(stage.quality(&truth, &lit.picture));
-                }
-            }
-            for (way, found) in cones.iter().zip(found) {
+            for (way, found) in ways().iter().zip(found) {
                 let [db, ssim, bias] = std::array::from_fn(|k| {
-                    found.iter().map(|quality| quality[k]).sum::<f64>() / found.len() as f64
+                    found.iter().map(|quality: &[f64; 3]| quality[k]).sum::<f64>() / found.len() as f64
                 });
                 let largest = found.iter().map(|quality| quality[2].abs()).fold(0.0, f64::max);
                 let does = if walks { "walks" } else { "stands" };
@@ -314,6 +298,72 @@ fn quality_over_a_walk() {
                     way.name
                 );
             }
+        }
+    }
+}
+
+/// Prints what bias is of: of all light, without what surfaces mirror, and without bumps, with so many cones an entry and with none of the lights mirrored itself.
+#[test]
+#[ignore = "measures; minutes"]
+fn what_bias_is_of() {
+    let ways = || {
+        let of = |name, cones| {
+            let moment = MomentParams { cones, ..MomentParams::default() };
+            sampled(name, LookUp::default(), SlcParams { moment, ..SlcParams::default() })
+        };
+        let alone = Lit::new("3, by cones alone", SlcShading::default(), false);
+        [of("1 cone", 1), of("2", 2), of("3", 3), of("4", 4), alone]
+    };
+    println!("| scene | cones | bias, % | PSNR |");
+    for name in ["village", "hangar"] {
+        for (what, alter) in [
+            ("all", (|_: &mut ShadingPoint| ()) as fn(&mut ShadingPoint)),
+            ("without gloss", |point| point.reflectance.specular = false),
+            ("without bumps", |point| point.normal_shading_world = point.normal_world),
+        ] {
+            for (does, walks) in [("walks", (true, 16)), ("stands", (false, 40))] {
+                let mut found = vec![Vec::new(); ways().len()];
+                for start_s in [1.0, 6.0, 11.0] {
+                    let stage = Stage { time_s: start_s, ..Stage::new(name, 0.3, [192, 108]) };
+                    walk(&stage, walks, alter, ways, &mut found);
+                }
+                for (way, found) in ways().iter().zip(found) {
+                    let mean =
+                        |k: usize| found.iter().map(|q: &[f64; 3]| q[k]).sum::<f64>() / found.len() as f64;
+                    println!("| {name}, {what}, {does} | {} | {:+.2} | {:.2} |", way.name, mean(2), mean(0));
+                }
+            }
+        }
+    }
+}
+
+/// Quality of each way and two seeds in every fourth of so many moments of a walk, or in the last where a viewer stands, after `alter` of all that is seen.
+fn walk<const N: usize>(
+    stage: &Stage,
+    (walks, steps): (bool, u32),
+    alter: impl Fn(&mut ShadingPoint),
+    ways: impl Fn() -> [Lit; N],
+    found: &mut [Vec<[f64; 3]>],
+) {
+    let mut cones: Vec<Lit> = (0..2).flat_map(|_| ways()).collect();
+    for (i, lit) in cones.iter_mut().enumerate() {
+        lit.params.seed = (i / N) as u64;
+    }
+    let mut tracer = Tracer::new(&stage.scene, &stage.scene.pose(stage.time_s));
+    for step in 1..=steps {
+        let time_s = stage.time_s + if walks { f64::from(step) / 15.0 } else { 0.0 };
+        let pose = stage.scene.pose(time_s);
+        tracer.update(&stage.scene, &pose);
+        let now = Now { scene: &stage.scene, pose: &pose, tracer: &tracer, environment: None };
+        let mut seen = stage.see(&now);
+        seen.points.iter_mut().flatten().for_each(&alter);
+        cones.iter_mut().for_each(|lit| lit.step(stage, &now, Some(&seen)));
+        if step % 4 != 0 || !walks && step < steps {
+            continue;
+        }
+        let truth = best_truth(&now, &seen, 256);
+        for (i, lit) in cones.iter().enumerate() {
+            found[i % N].push(stage.quality(&truth, &lit.picture));
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use dapple_metrics::{psnr, ssim};
+use dapple_metrics::{mean_bias, psnr, ssim};
 use dapple_render::area_lights::AreaLightTable;
 use dapple_render::gbuffer::{GBuffer, rasterize};
 use dapple_render::image::{LinearImage, Rgb8Image, ToneMap};
@@ -11,13 +11,9 @@ use dapple_render::slc::{CapTable, ConeLight, KeptCaps, SlcShading, pixel_places
 use dapple_scene::glam::Vec3;
 use dapple_scene::{NoFiles, PosedCamera, Scene, ShadingPoint, builtin};
 use dapple_server::cones::{ConeServer, ConeStep, Now, cone_charts};
-use dapple_store::cones::{CacheParams, Charting, EntryId, EntrySite, MomentEntry, View, luminance};
+use dapple_store::cones::{CacheParams, Charting, EntryId, EntrySite, MomentEntry, View};
 use dapple_trace::direct::{DirectParams, trace_direct};
 use dapple_trace::slc::SlcParams;
-
-/// Most of a channel of pixels whose means are compared, and how many pixels from brighter ones they are.
-const BRIGHTEST: f32 = 4.0;
-const BESIDE: usize = 1;
 
 /// A picture of a built-in scene at a moment, before it is lit.
 pub(crate) struct Stage {
@@ -67,23 +63,11 @@ impl Stage {
             };
             p.pixels.iter().map(|p| of(p) / 255.0).collect::<Vec<f32>>()
         };
-        // Of lamps themselves nothing is asked, nor of what lies beside: there, pixels that are told apart by how bright the truth is would have the light of
-        // those left out. What is found is not cut: noise would look like a lack of light.
-        let (mut all, mut more) = (0.0, 0.0);
-        let side = width as usize;
-        for (i, (truth_here, found)) in truth.iter().zip(found).enumerate() {
-            let (x, y) = (i % side, i / side);
-            let mut rows = truth.chunks(side).skip(y.saturating_sub(BESIDE)).take(y.min(BESIDE) + BESIDE + 1);
-            let columns = x.saturating_sub(BESIDE)..(x + BESIDE + 1).min(side);
-            if !rows.any(|row| row[columns.clone()].iter().any(|p| p.max_element() > BRIGHTEST)) {
-                all += f64::from(luminance(*truth_here));
-                more += f64::from(luminance(*found - *truth_here));
-            }
-        }
+        let [truth, found] = [truth, found].map(|p| p.iter().flat_map(Vec3::to_array).collect::<Vec<_>>());
         [
             psnr(&unit(&a), &unit(&b), 1.0).unwrap(),
             ssim(width, height, &luma(&a), &luma(&b)).unwrap(),
-            100.0 * more / all,
+            100.0 * mean_bias(width, height, &truth, &found).unwrap(),
         ]
     }
 }

@@ -4,6 +4,7 @@ use std::f32::consts::PI;
 
 use dapple_scene::glam::{Affine3A, Vec3};
 use dapple_scene::{EmitterShape, PosedInstance};
+use dapple_store::cones::GRAZING_COSINE;
 
 use super::tests::{Rig, assert_near, mean, over};
 use super::*;
@@ -91,6 +92,40 @@ fn a_cone_of_several_lights_follows_them_together() {
     let had = at(0.0).map(irradiance).iter().sum();
     let left = follows(&kept, &mut |_, cache| assert_near(mean(cache), had, 0.02));
     assert_near(left, had, 0.02);
+}
+
+/// A small lamp goes up over a horizon that bumps lean away from: as long as it grazes them, its light counts as it did, and then by its cosine. Nothing is sampled.
+/// Under the floor nothing of it is left.
+#[test]
+fn a_lamp_that_rises_over_leaning_bumps_is_followed() {
+    let lamp = (sphere(Vec3::ZERO, 0.02, 12, 16), EmitterShape::Sphere, 1e4, over(2.0));
+    let mut rig = Rig::new(vec![lamp]);
+    // Leaning towards +X, by 53°, away from the lamp.
+    rig.lean([0.8, 0.0]);
+    let posed = |degrees: f32| {
+        let mut pose = rig.pose.clone();
+        let at = Vec3::new(-degrees.to_radians().cos(), degrees.to_radians().sin(), 0.0) * 2.0;
+        pose.instances[1].world_from_mesh = Affine3A::from_translation(at);
+        pose
+    };
+    let params = SlcParams { changed_samples: 0, ..SlcParams::default() };
+    let mut cache = rig.cache();
+    let mut before = posed(20.0);
+    for _ in 0..40 {
+        rig.step(&mut cache, &before, &before, &params);
+    }
+    let whole = 1e4 * PI * 1e-4;
+    assert_near(mean(&cache), whole * GRAZING_COSINE, 0.02);
+    for degrees in [40.0f32, 52.5, 54.0, 55.0, 56.0, 60.0, 75.0, 90.0, 57.0, 30.0] {
+        let now = posed(degrees);
+        rig.step(&mut cache, &before, &now, &params);
+        // The horizon of what leans is at 53.13°.
+        let cosine = (degrees - 53.1301).to_radians().sin().max(GRAZING_COSINE);
+        assert_near(mean(&cache), whole * cosine, 0.05);
+        before = now;
+    }
+    rig.step(&mut cache, &before, &posed(-20.0), &params);
+    assert_eq!(mean(&cache), 0.0);
 }
 
 /// What moves before lights that stay may hide them, but turns no cone: not by a bit.

@@ -65,6 +65,11 @@ impl Rig {
         Rig { scene, pose, pixels, environment: None }
     }
 
+    /// What of the shading normal of all places lies along their triangle's edges.
+    pub(super) fn lean(&mut self, lean: [f32; 2]) {
+        self.pixels.iter_mut().flatten().for_each(|pixel| pixel.lean = lean);
+    }
+
     fn queue<E: ConeEntry>(&self, cache: &mut ConeCache<E>) -> UpdateQueue {
         let view = View { width: SIDE as usize, pixels: &self.pixels };
         cache.admit(&Requests::gather(&[view], &LookUp { bias: 1.0, blend: false }))
@@ -179,7 +184,7 @@ fn irradiance_is_by_the_cosine_to_the_shading_normal() {
     // Leans towards +X, along the first edge, by 53°.
     let leaning = |degrees: f32, lean: [f32; 2]| {
         let mut rig = Rig::new(vec![ball(degrees)]);
-        rig.pixels.iter_mut().flatten().for_each(|pixel| pixel.lean = lean);
+        rig.lean(lean);
         mean(&rig.settled(40, &SlcParams::default()))
     };
     let whole = 10.0 * PI * 0.01;

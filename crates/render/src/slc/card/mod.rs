@@ -110,8 +110,7 @@ struct ConeUniform {
     flags: u32,
     first_row: i32,
     lights: i32,
-    hidden_classes: u32,
-    pad_b: u32,
+    pad_b: [u32; 2],
 }
 
 /// Shades cones on a card. Keeps what it sent from moment to moment.
@@ -122,7 +121,6 @@ pub struct ConePass {
     uniform: wgpu::Buffer,
     lights: wgpu::Texture,
     light_count: i32,
-    hidden_classes: u32,
     entries: Entries,
     entry_table: wgpu::Texture,
     hash_table: wgpu::Texture,
@@ -152,7 +150,6 @@ impl ConePass {
             }),
             lights: float_table(gpu, "lights of cones", TABLE_WIDTH as u32, MAX_AREA_LIGHTS as u32),
             light_count: 0,
-            hidden_classes: 0,
             entries: Entries::default(),
             entry_table: word_table(gpu, "cones", (ROW_TEXELS as u32, 1, 2)),
             hash_table: word_table(gpu, "blocks of cones", (HASH_ROW_TEXELS as u32, 1, 1)),
@@ -173,7 +170,6 @@ impl ConePass {
             write_rows(gpu, &self.lights, 0, &lights);
         }
         self.light_count = (lights.len() / TABLE_WIDTH) as i32;
-        self.hidden_classes = table.lights.map_or(0, |lights| lights.hidden_classes());
         let sent = self.send_entries(gpu) + self.send_hash(gpu) + size_of_val(&lights[..]) as u64;
         match gpu.take_fault() {
             None => Ok(sent),
@@ -249,8 +245,7 @@ impl ConePass {
             let end = (first + rows).min(height);
             self.write_samples(gpu, view, shading.look_up.bias, first..end);
             let (first_row, lights) = (first as i32, self.light_count);
-            let hidden_classes = self.hidden_classes;
-            let uniform = ConeUniform { first_row, lights, hidden_classes, ..cone_uniform(shading, places) };
+            let uniform = ConeUniform { first_row, lights, ..cone_uniform(shading, places) };
             gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             let background = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
@@ -355,8 +350,7 @@ fn cone_uniform(shading: &SlcShading, places: usize) -> ConeUniform {
         flags,
         first_row: 0,
         lights: 0,
-        hidden_classes: 0,
-        pad_b: 0,
+        pad_b: [0; 2],
     }
 }
 

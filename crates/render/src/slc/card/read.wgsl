@@ -14,9 +14,7 @@ struct ConeParams {
     first_row: i32,
     // In the table of lights; 0: all by cones.
     lights: i32,
-    // A bit for each class of lights that are not in it.
-    hidden_classes: u32,
-    pad_b: u32,
+    pad_b: vec2<u32>,
 }
 
 // In `flags`: a sample reads the 2 × 2 texels about it; energies are irradiance; what several entries hold is shaded cone by cone.

@@ -157,12 +157,12 @@ struct Toward {
 
 fn toward(p: ConePoint, cone: Cone, site: Site, slot: i32) -> Toward {
     let nothing = Toward(p.surface.normal, 0.0, vec3(0.0), 0.0, 0.0);
-    let ball = area_texel(slot, 0);
     let shine = area_texel(slot, 1);
     let form = area_form(shine);
     if (form == 0) || ((cone.several >> u32(i32(shine.w) / AREA_FORMS)) & 1u) == 0u {
         return nothing;
     }
+    let ball = area_texel(slot, 0);
     let offset = ball.xyz - p.surface.position;
     let distance_squared = max(dot(offset, offset), SMALLEST);
     let direction = offset / sqrt(distance_squared);
@@ -331,7 +331,7 @@ fn reflected_of_cones(p: ConePoint, place: Place) -> vec3<f32> {
                 continue;
             }
             cone.energy *= 1.0 - share;
-            if is_smooth(p) && is_ratio && cone.several != 0u && (cone.several & params.hidden_classes) == 0u && directions_of(p, cone) > 1 {
+            if is_smooth(p) && is_ratio && cone.several != 0u && directions_of(p, cone) > 1 {
                 lit = lit_by_several(p, lit, cone, site, near[i]);
             } else if each_apart {
                 lit = lit_by(p, lit, cone, site, near[i]);

@@ -177,7 +177,6 @@ fn the_module_is_valid_within_webgl2_and_laid_out_like_its_mirror() {
         ("flags", offset_of!(ConeUniform, flags)),
         ("first_row", offset_of!(ConeUniform, first_row)),
         ("lights", offset_of!(ConeUniform, lights)),
-        ("hidden_classes", offset_of!(ConeUniform, hidden_classes)),
         ("pad_b", offset_of!(ConeUniform, pad_b)),
     ];
     check_struct(&module, "ConeParams", size_of::<ConeUniform>(), &members).unwrap();

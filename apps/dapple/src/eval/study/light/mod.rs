@@ -8,10 +8,10 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Result, bail};
-use dapple_metrics::{PIXELS_PER_DEGREE, flip, psnr, ssim};
+use dapple_metrics::{PIXELS_PER_DEGREE, flip, mean_bias, psnr, ssim};
 use dapple_render::image::{LinearImage, Rgb8Image, ToneMap};
 use dapple_scene::Pose;
-use dapple_scene::area_lights::{AreaLights, Environment, luminance};
+use dapple_scene::area_lights::{AreaLights, Environment};
 use dapple_scene::glam::Vec3;
 use dapple_server::cones::Now;
 use dapple_store::cones::Charting;
@@ -117,7 +117,7 @@ struct Quality {
     mse: f64,
     ssim: f64,
     flip: f64,
-    /// See [`bias`].
+    /// See [`mean_bias`].
     bias: f64,
     count: f64,
 }
@@ -133,7 +133,8 @@ impl Quality {
         self.ssim += ssim(width, height, &luma(&a.pixels), &luma(&b.pixels))?;
         self.flip +=
             flip(width, height, a.pixels.as_flattened(), b.pixels.as_flattened(), PIXELS_PER_DEGREE)?.mean;
-        self.bias += bias(width, truth, found);
+        let [truth, found] = [truth, found].map(|p| p.iter().flat_map(Vec3::to_array).collect::<Vec<_>>());
+        self.bias += mean_bias(width, height, &truth, &found)?;
         self.count += 1.0;
         Ok(())
     }
@@ -153,30 +154,6 @@ impl Quality {
     fn bias_percent(&self) -> f64 {
         100.0 * self.bias / self.count
     }
-}
-
-/// Most of a channel at pixels whose means are compared: a lamp itself, its mirror image, or a wall beside it would hide all else.
-const BRIGHTEST: f32 = 4.0;
-
-/// Pixels about a brighter one that are left out with it, in rows and columns: blurred, its light falls on those beside, and would be held against them.
-const BESIDE: usize = 1;
-
-/// How much brighter the mean luminance is than the truth's, parts, over pixels that are neither brighter in truth than [`BRIGHTEST`] nor beside one that is. What is
-/// found there is taken as it is: cut to what a display can show, noise would look like a lack of light.
-fn bias(width: u32, truth: &[Vec3], found: &[Vec3]) -> f64 {
-    let side = width as usize;
-    let is_bright = |pixel: &Vec3| pixel.max_element() > BRIGHTEST;
-    let (mut all, mut more) = (0.0, 0.0);
-    for (i, (truth_here, found)) in truth.iter().zip(found).enumerate() {
-        let (x, y) = (i % side, i / side);
-        let mut rows = truth.chunks(side).skip(y.saturating_sub(BESIDE)).take(y.min(BESIDE) + BESIDE + 1);
-        let columns = x.saturating_sub(BESIDE)..(x + BESIDE + 1).min(side);
-        if !rows.any(|row| row[columns.clone()].iter().any(is_bright)) {
-            all += f64::from(luminance(*truth_here));
-            more += f64::from(luminance(*found - *truth_here));
-        }
-    }
-    more / f64::max(all, 1e-12)
 }
 
 /// What a display shows.
