@@ -17,6 +17,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::direct_light::CONES_MIB;
 use crate::direct_light::picture::DirectLight;
 pub(crate) use bake::BakeArgs;
 pub(crate) use bench::{Bench, BenchArgs, JoinArgs, ServedArgs, SoakArgs, ViewersArgs};
@@ -86,7 +87,9 @@ Examples:
   dapple render --builtin atrium --view error -o error.png        psao against rtao, per pixel
   dapple render --builtin atrium --method ssao --view visibility -o ssao.png
   dapple render --builtin atrium --method sao --ao-preset low --guard-band 0.2 -o sao.png
-  dapple render room.glb --method rtao --view visibility -o visibility.exr";
+  dapple render room.glb --method rtao --view visibility -o visibility.exr
+  dapple render --builtin street --method none --direct-light slc -o street.png       soft shadows of whatever emits
+  dapple render room.glb --direct-light rt-64 --environment sky.hdr -o room.png";
 
 const QUALITY_EXAMPLES: &str = "\
 Examples:
@@ -212,13 +215,16 @@ pub(crate) struct RenderArgs {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct DirectLightArgs {
     /// Light surfaces by what emits, by rt-N (N rays a sample), ris, restir-di, slc (light cones; slc-quick with coarser ones
-    /// for a quarter to a half of the rays; slc-fast for still less, unblended; slc-fine with fine ones, for what stands still;
-    /// slc-card has a graphics card shade them) or slc-paper; with -power behind it lights are picked as the paper does. No sun is made up then. Without it what emits is seen, but lights nothing.
+    /// for a quarter to a half of the rays; slc-fast for still less, unblended; slc-fine with fine ones, for what stands still:
+    /// the best with --light-steps 256; slc-card has a graphics card shade them) or slc-paper; with -power behind it lights are picked as the paper does. No sun is made up then. Without it what emits is seen, but lights nothing.
     #[arg(long, value_name = "METHOD")]
     pub(crate) direct_light: Option<DirectLight>,
     /// Steps at 15 Hz that lead to the picture, for methods that remember (restir-di and those of cones).
     #[arg(long, value_name = "N", default_value_t = 16, requires = "direct_light")]
     pub(crate) light_steps: u32,
+    /// Memory that light cones may take, MiB. What does not fit stays dark, and is told.
+    #[arg(long, value_name = "MIB", default_value_t = CONES_MIB, requires = "direct_light")]
+    pub(crate) light_memory: u64,
     /// Light from all around: an equirectangular Radiance picture. Its middle lies towards −Z.
     #[arg(long, value_name = "FILE.hdr", requires = "direct_light")]
     pub(crate) environment: Option<PathBuf>,

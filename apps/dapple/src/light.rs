@@ -55,10 +55,8 @@ pub(crate) fn server_config(scene: &Scene, args: &LightArgs) -> Result<ServerCon
 }
 
 /// How visibility of area lights is kept, if that is wanted; says so where there are none.
-fn area_lights(scene: &Scene, wanted: bool) -> Option<TrackerParams> {
-    if !wanted {
-        return None;
-    }
+fn area_lights(scene: &Scene, tolerance: Option<f32>) -> Option<TrackerParams> {
+    let tolerance = tolerance?;
     let lights = AreaLights::new(scene, &scene.pose(0.0));
     if lights.is_empty() {
         tracing::warn!(
@@ -66,13 +64,15 @@ fn area_lights(scene: &Scene, wanted: bool) -> Option<TrackerParams> {
         );
     }
     warn_of_lights(&lights);
+    warn_of_many(&lights);
+    Some(TrackerParams { tolerance, ..TrackerParams::default() })
+}
+
+/// Tells of more lights than viewers are told of.
+pub(crate) fn warn_of_many(lights: &AreaLights<'_>) {
     if lights.len() > MAX_AREA_LIGHTS {
-        tracing::warn!(
-            "--area-lights: of {} lights viewers show the {MAX_AREA_LIGHTS} most powerful",
-            lights.len()
-        );
+        tracing::warn!("of {} area lights viewers show the {MAX_AREA_LIGHTS} most powerful", lights.len());
     }
-    Some(TrackerParams::default())
 }
 
 /// How far density follows the gradient of visibility.

@@ -45,8 +45,12 @@ pub(crate) fn run(args: &RenderArgs) -> Result<()> {
     let mut drawn = draw(scene, &camera, args.time, &params)?;
     drop(wheel);
     if let Some(DirectLight(technique)) = args.direct.direct_light {
-        let lighting =
-            Lighting { technique, steps: args.direct.light_steps, environment: environment.as_ref() };
+        let lighting = Lighting {
+            technique,
+            steps: args.direct.light_steps,
+            cones_mib: args.direct.light_memory,
+            environment: environment.as_ref(),
+        };
         direct_light::picture::add(&lighting, scene, &camera, args.time, &mut drawn)?;
     }
     let (path, width, height) = (&args.output, drawn.gbuffer.width, drawn.gbuffer.height);
@@ -165,6 +169,9 @@ fn check(args: &RenderArgs) -> Result<()> {
     }
     if !(1..=10_000).contains(&args.direct.light_steps) {
         bail!("--light-steps is {}, must be 1 to 10000", args.direct.light_steps);
+    }
+    if !(1..=1 << 20).contains(&args.direct.light_memory) {
+        bail!("--light-memory is {}, must be 1 to 1048576 MiB", args.direct.light_memory);
     }
     if !args.time.is_finite() {
         bail!("--time must be a finite number of seconds");

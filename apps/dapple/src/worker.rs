@@ -280,7 +280,7 @@ fn config(setup: &Setup, shard: Shard) -> ServerConfig {
         },
         cuts: setup.cuts,
         // Exact but for what nobody sees: the host sends on what it gets.
-        lights: setup.area_lights.then(TrackerParams::default),
+        lights: setup.area_lights.map(|tolerance| TrackerParams { tolerance, ..TrackerParams::default() }),
         shard: Some(shard),
         ..ServerConfig::default()
     }

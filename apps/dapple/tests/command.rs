@@ -5,7 +5,7 @@ mod common;
 
 use std::path::Path;
 
-use common::command::{fail, files, partial_files, png_size, succeed};
+use common::command::{fail, files, partial_files, png_size, run, succeed};
 use common::made;
 use dapple_gpu::testing::gpu_for_tests;
 use dapple_scene::{NoFiles, builtin, load};
@@ -234,6 +234,33 @@ fn area_lights_light_a_picture() {
         let off = card.iter().zip(&twin).filter(|(a, b)| a.abs_diff(**b) > 1).count();
         assert!(off * 500 < twin.len(), "{off} of {} bytes differ", twin.len());
     }
+    // What there is no room for is told.
+    let full = [
+        "render",
+        "--builtin",
+        "cornell",
+        "--detail",
+        "0.1",
+        "--camera",
+        "path-box",
+        "--size",
+        "320x180",
+        "--method",
+        "none",
+        "--supersample",
+        "1",
+        "--direct-light",
+        "slc-fine",
+        "--light-steps",
+        "1",
+        "--light-memory",
+        "1",
+        "-o",
+        "full.png",
+    ];
+    let (output, out, err) = run(at, &full);
+    assert!(output.status.success(), "{out}\n{err}");
+    assert!(err.contains("stay dark") && err.contains("--light-memory"), "{err}");
     let lit = render("sky.png", &["--direct-light", "rt-16", "--environment", "sky.hdr"]);
     assert!(lit > rays + 5.0, "{lit}, without a sky {rays}");
     let lid = |arguments: &[&'static str]| [&["render", "lid.glb", "-o", "out.png"], arguments].concat();
@@ -243,6 +270,7 @@ fn area_lights_light_a_picture() {
     fail(at, &lid(&["--direct-light", "slc", "--environment", "bad.hdr"]), &["bad.hdr", ".hdr"]);
     fail(at, &lid(&["--direct-light", "slc", "--environment", "none.hdr"]), &["none.hdr"]);
     fail(at, &lid(&["--direct-light", "slc", "--light-steps", "0"]), &["--light-steps", "0"]);
+    fail(at, &lid(&["--direct-light", "slc", "--light-memory", "0"]), &["--light-memory", "0"]);
     assert!(!at.join("out.png").exists());
 }
 

@@ -168,6 +168,24 @@ fn nodes_are_sorted_and_extras_read() {
 }
 
 #[test]
+fn lights_of_a_form_that_shine_otherwise_are_told() {
+    let mut b = Builder::default();
+    let p = b.floats("VEC3", &TRIANGLE);
+    let piece = |material: u32| format!(r#"{{"attributes":{{"POSITION":{p}}},"material":{material}}}"#);
+    let (dark, red, green) = (piece(0), piece(1), piece(2));
+    let scene = loaded(&b.glb(&format!(
+        r#""materials":[{{}},{{"emissiveFactor":[1,0,0]}},{{"emissiveFactor":[0,1,0]}}],
+        "meshes":[{{"primitives":[{dark}]}},{{"primitives":[{dark},{red}]}},{{"primitives":[{red},{green}]}}],
+        "nodes":[{{"name":"unlit","mesh":0,"extras":{{"light":"sphere"}}}},{{"name":"lamp","mesh":1,"extras":{{"light":"disc"}}}},
+                 {{"name":"two","mesh":2,"extras":{{"light":"rectangle"}}}},{{"name":"mesh","mesh":2,"extras":{{"light":"triangles"}}}}]"#
+    )));
+    let told: Vec<&str> = scene.warnings.iter().map(|w| w.message.as_str()).collect();
+    assert_eq!(told.len(), 2, "{told:?}");
+    assert!(told[0].contains("unlit") && told[0].contains("emissiveFactor"), "{told:?}");
+    assert!(told[1].contains("two") && told[1].contains("2 materials"), "{told:?}");
+}
+
+#[test]
 fn cameras_and_lights() {
     let scene = loaded(&glb(
         r#"{"asset":{"version":"2.0"},

@@ -18,11 +18,11 @@ use dapple_trace::slc::{Changes, EntryPlaces, Moment, SlcCounts, Update};
 /// Edge of a chart's texels, metres, at level 0. Texels of the cache are up to 64 times finer.
 pub const CHART_TEXEL_M: f32 = 0.05;
 
-/// The charts that all ends of a scene lay cones on: one set for all instances of equal mesh and rest space. Instances that carry no
-/// light (`receives`), and those whose charts cannot be made, have none; the latter come with the reason.
+/// The charts that all ends of a scene lay cones on: one set for all instances of equal mesh and rest space. Those whose charts cannot be
+/// made have none, and come with the reason. What carries no points (`receives`) has charts all the same: rays light it, too.
 pub fn cone_charts(scene: &Scene) -> (Charting, Vec<String>) {
     let key = |instance: &dapple_scene::Instance| {
-        instance.receives.then_some(InstanceKey {
+        Some(InstanceKey {
             mesh: instance.mesh,
             rest_from_mesh: instance.rest_from_mesh,
             texel_m: CHART_TEXEL_M,

@@ -84,6 +84,11 @@ impl ServerConfig {
             let lights = AreaLights::new(scene, &scene.pose_undeformed(0.0)).len() as u32;
             LightVisibility::check(points as usize, lights)?;
         }
+        if let Some(TrackerParams { tolerance, .. }) = self.lights
+            && !(0.0..=1.0).contains(&tolerance)
+        {
+            return Err(ServerError::BadLightTolerance(tolerance));
+        }
         Ok(self.update.check()?)
     }
 }
@@ -158,6 +163,9 @@ pub enum ServerError {
          out --adaptive and --max-points"
     )]
     UnevenShard,
+    /// An error of an area light's visibility that may wait is no share of a point's light.
+    #[error("the share of a point's light that may be off is {0}, must be 0 to 1 (--area-lights=T)")]
+    BadLightTolerance(f32),
     /// Points that came did not fit those that there are.
     #[error(transparent)]
     Layout(#[from] LayoutError),

@@ -20,6 +20,8 @@ Examples:
   dapple eval --suite builtins --frames 2        every built-in scene, in a few minutes
   dapple eval --suite sao                        screen-space methods, with the tables and plots of SAO's paper
   dapple eval --suite stochastic                 hidden surfaces: a paper's tables and figures, in ten minutes
+  dapple eval --suite slc                        area lights by rays and by light cones: a paper's tables and figures, in 16 minutes
+  dapple eval --builtin street --methods slc,none         what it costs to stream how much of area lights is seen
   dapple eval --suite mine.toml --threads 1      scenes and settings from a file (docs/suites.md)
   dapple eval --smoke                            assert the bounds that the tests assert
 

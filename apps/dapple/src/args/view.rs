@@ -49,9 +49,16 @@ pub(crate) struct ViewArgs {
     #[arg(long, value_name = "H", allow_hyphen_values = true)]
     pub(crate) hz: Option<f64>,
     /// Draw soft shadows of whatever emits: points say how much of each light they see. What plays a stream or a page draws them where the stream has them. L turns
-    /// them off and on.
-    #[arg(long, conflicts_with_all = ["stream", "url"])]
-    pub(crate) area_lights: bool,
+    /// them off and on. T is as of dapple serve.
+    #[arg(
+        long,
+        value_name = "T",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "0.1",
+        conflicts_with_all = ["stream", "url"]
+    )]
+    pub(crate) area_lights: Option<f32>,
     #[command(flatten)]
     pub(crate) visibility: VisibilityArgs,
     #[command(flatten)]

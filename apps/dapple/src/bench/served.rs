@@ -36,7 +36,7 @@ impl Served {
         let mut child = Command::new(program)
             .args(["serve", "--builtin", &args.builtin, "--detail", &args.detail.to_string()])
             .args(["--points", &args.points.to_string(), "--hz", &args.hz.to_string(), "--port", "0"])
-            .args(args.area_lights.then_some("--area-lights"))
+            .args(args.area_lights.map(|tolerance| format!("--area-lights={tolerance}")))
             .args(more)
             .args(moq)
             .env_remove("DAPPLE_TOKENS")

@@ -25,6 +25,9 @@ use dapple_trace::slc::{PaperParams, SlcParams};
 
 use self::card::Card;
 
+/// Memory that cones may take unless somebody says otherwise, MiB: four times what a picture of 1280 × 720 needs. It is taken as it is needed.
+pub(crate) const CONES_MIB: u64 = 4096;
+
 /// Steps a second of what remembers earlier frames.
 pub(crate) const STEPS_HZ: f64 = 15.0;
 
@@ -182,6 +185,17 @@ pub(crate) struct Cost {
     pub(crate) memory: Option<CacheCounts>,
 }
 
+impl Cost {
+    /// Tells of places that there was no memory for, and what to do.
+    pub(crate) fn refused(&self, more: &str) -> Option<String> {
+        let ConeStep { refused, wanted, .. } = self.step.filter(|step| step.refused > 0)?;
+        Some(format!(
+            "{refused} of {} places have no cones and stay dark, as the memory for them is full: {more}, or take a method with coarser ones (slc-fast)",
+            wanted + refused
+        ))
+    }
+}
+
 /// A technique at work for several viewers, frame after frame.
 pub(crate) enum Lighter {
     Rays { samples: u32, sampler: Sampler, frame: u64 },
@@ -192,7 +206,9 @@ pub(crate) enum Lighter {
 }
 
 impl Lighter {
-    pub(crate) fn new(technique: Technique) -> Result<Lighter> {
+    /// With so much memory for cones, MiB.
+    pub(crate) fn new(technique: Technique, cones_mib: u64) -> Result<Lighter> {
+        let most = CacheParams { most_bytes: cones_mib << 20, ..CacheParams::default() };
         Ok(match technique {
             Technique::Rays { samples, sampler } => Lighter::Rays { samples, sampler, frame: 0 },
             Technique::Ris { sampler } => Lighter::Ris { sampler, frame: 0 },
@@ -204,11 +220,11 @@ impl Lighter {
                 before: None,
             })),
             Technique::PaperCones { params, look_up, reuse_finer } => {
-                let server = ConeServer::new(CacheParams { reuse_finer, ..CacheParams::default() }, look_up)?;
+                let server = ConeServer::new(CacheParams { reuse_finer, ..most }, look_up)?;
                 Lighter::Paper(Box::new(PaperCones { server, caps: KeptCaps::default(), params, look_up }))
             }
             Technique::Cones(how) => Lighter::Cones(Box::new(Cones {
-                server: ConeServer::new(CacheParams::default(), how.shading.look_up)?,
+                server: ConeServer::new(most, how.shading.look_up)?,
                 caps: KeptCaps::default(),
                 how,
                 card: how.on_card.then(Card::new).transpose()?,

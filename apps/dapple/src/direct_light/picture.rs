@@ -51,6 +51,8 @@ pub(crate) struct Lighting<'a> {
     pub(crate) technique: Technique,
     /// Steps that lead to the picture, for methods that remember.
     pub(crate) steps: u32,
+    /// What cones may take.
+    pub(crate) cones_mib: u64,
     pub(crate) environment: Option<&'a Environment>,
 }
 
@@ -71,7 +73,7 @@ pub(crate) fn add(
             scene.name
         );
     }
-    let mut lighter = Lighter::new(lighting.technique)?;
+    let mut lighter = Lighter::new(lighting.technique, lighting.cones_mib)?;
     let charting = if lighter.has_cones() { charts(scene) } else { Charting::default() };
     let steps = if lighter.is_stateless() { 1 } else { lighting.steps.max(1) };
     let bar = Bar::new("direct light", u64::from(steps));
@@ -83,9 +85,14 @@ pub(crate) fn add(
         let lights = now.lights(&pose);
         // Places on surfaces are those of the picture, wherever they were.
         let seen = [Seen::of(&now, *camera, drawn.gbuffer.clone())];
-        let (mut pictures, _) = lighter.light(&now, &lights, &seen, &charting, &mut |_| ())?;
+        let (mut pictures, cost) = lighter.light(&now, &lights, &seen, &charting, &mut |_| ())?;
         let found = pictures.swap_remove(0);
         if step + 1 == steps {
+            if let Some(why) =
+                cost.refused(&format!("give --light-memory more than {} MiB", lighting.cones_mib))
+            {
+                tracing::warn!("{why}");
+            }
             for ((direct, lit), point) in drawn.shaded.direct.iter_mut().zip(&found).zip(&seen[0].points) {
                 if let Some(point) = point {
                     *direct += point.reflected_of(*lit);

@@ -23,8 +23,10 @@ use super::stage::Stage;
 use super::truth::Cache;
 use super::work::Work;
 use crate::args::EvalArgs;
+use crate::direct_light::warn_of_lights;
 use crate::inspect::MAX_RECORDING_BYTES;
 use crate::judge::Judge;
+use crate::light::warn_of_many;
 use crate::picture::write_file;
 use crate::source::{self, Loaded, read_limited};
 
@@ -200,10 +202,14 @@ impl Run<'_> {
         if let Some(stage) = stages.first()
             && entry.settings.methods.iter().any(|m| m.uses_points())
         {
-            if entry.settings.has_area_lights()
-                && AreaLights::new(&loaded.scene, &loaded.scene.pose(0.0)).is_empty()
-            {
-                bail!("--methods slc: nothing in {} emits, so there is no light to shadow", loaded.title);
+            if entry.settings.has_area_lights() {
+                let pose = loaded.scene.pose(0.0);
+                let lights = AreaLights::new(&loaded.scene, &pose);
+                if lights.is_empty() {
+                    bail!("--methods slc: nothing in {} emits, so there is no light to shadow", loaded.title);
+                }
+                warn_of_lights(&lights);
+                warn_of_many(&lights);
             }
             for &points_per_m2 in &entry.settings.points_per_m2 {
                 Start::new(stage, points_per_m2).check(&loaded.scene)?;

@@ -10,7 +10,7 @@ pub(crate) fn dapple(folder: &Path, arguments: &[&str]) -> Command {
     command
 }
 
-fn run(folder: &Path, arguments: &[&str]) -> (Output, String, String) {
+pub(crate) fn run(folder: &Path, arguments: &[&str]) -> (Output, String, String) {
     let output = dapple(folder, arguments).output().unwrap();
     let [out, err] =
         [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes).into_owned());

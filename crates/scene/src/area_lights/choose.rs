@@ -59,10 +59,10 @@ impl Facing {
         self.within(offset, offset.length(), radius)
     }
 
+    #[inline]
     fn within(&self, offset: Vec3, distance: f32, radius: f32) -> f32 {
         let cosine = cosine_within(self.normal_world, offset, distance, radius);
-        let is_above =
-            cosine < self.least_cosine && cosine_within(self.ground_world, offset, distance, radius) > 0.0;
+        let is_above = cosine < self.least_cosine && self.ground_world.dot(offset) > -radius;
         if is_above { self.least_cosine } else { cosine }
     }
 }
@@ -185,12 +185,19 @@ fn weight_of(sums: &[f32], light: usize) -> f32 {
 }
 
 /// Largest cosine of a unit normal to a direction within a ball at an offset: 1 inside it or without a normal, 0 below the horizon.
+#[inline]
 fn cosine_within(normal: Vec3, offset: Vec3, distance: f32, radius: f32) -> f32 {
-    if normal == Vec3::ZERO || distance <= radius {
+    let height = normal.dot(offset);
+    if distance <= radius || height == 0.0 && normal == Vec3::ZERO {
         return 1.0;
     }
-    let cos_angle = (normal.dot(offset) / distance).clamp(-1.0, 1.0);
-    let sin_spread = radius / distance;
+    // Of many lights, half are here.
+    if height <= -radius {
+        return 0.0;
+    }
+    let inverse = 1.0 / distance;
+    let cos_angle = (height * inverse).clamp(-1.0, 1.0);
+    let sin_spread = radius * inverse;
     let cos_spread = (1.0 - sin_spread * sin_spread).max(0.0).sqrt();
     if cos_angle >= cos_spread {
         return 1.0;

@@ -40,7 +40,7 @@ pub enum EnvironmentError {
         texels: usize,
     },
     /// A value that no light has.
-    #[error("the environment's texel ({x}, {y}) is {value}: radiance must be a number ≥ 0")]
+    #[error("the environment's texel ({x}, {y}) is {value}: radiance must be a number, 0 … 1e30")]
     Value {
         /// Column.
         x: usize,
@@ -59,6 +59,9 @@ pub enum EnvironmentError {
 /// Longest side of an environment, texels.
 pub const MAX_SIDE: usize = 16_384;
 
+/// Largest radiance, W/(m² sr): the sum of all texels has to be a number.
+pub const MAX_RADIANCE: f32 = 1e30;
+
 impl Environment {
     /// From radiance in W/(m² sr), rows from the top.
     ///
@@ -74,7 +77,10 @@ impl Environment {
         if !sides.contains(&width) || !sides.contains(&height) || texels.len() != width * height {
             return Err(EnvironmentError::Size { width, height, texels: texels.len() });
         }
-        if let Some(i) = texels.iter().position(|t| !t.is_finite() || t.min_element() < 0.0) {
+        if let Some(i) = texels
+            .iter()
+            .position(|t| !t.cmpge(Vec3::ZERO).all() || !t.cmple(Vec3::splat(MAX_RADIANCE)).all())
+        {
             return Err(EnvironmentError::Value { x: i % width, y: i / width, value: texels[i] });
         }
         let mut this = Environment {

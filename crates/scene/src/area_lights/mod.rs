@@ -16,7 +16,7 @@ mod tests;
 use glam::Vec3;
 
 pub use choose::{Chooser, Facing, Pick};
-pub use environment::{Environment, EnvironmentError, MAX_SIDE};
+pub use environment::{Environment, EnvironmentError, MAX_RADIANCE, MAX_SIDE};
 pub use figure::{LightFigure, LightForm, LightPlace, LightTriangle};
 pub use shape::EmitterShape;
 

@@ -375,6 +375,11 @@ fn what_cannot_shine_gives_nothing_and_breaks_nothing() {
     assert!(AreaLights::new(&dark.scene, &pose).is_empty());
     assert!(Environment::new(0, 1, vec![], Mat3::IDENTITY).is_err());
     assert!(Environment::new(1, 1, vec![Vec3::splat(f32::NAN)], Mat3::IDENTITY).is_err());
+    assert!(Environment::new(1, 1, vec![Vec3::splat(2.0 * MAX_RADIANCE)], Mat3::IDENTITY).is_err());
+    let bright = Environment::new(64, 32, vec![Vec3::splat(MAX_RADIANCE); 2048], Mat3::IDENTITY).unwrap();
+    assert!(bright.mean_radiance().is_finite());
+    let (_, radiance, density) = bright.sample([0.3, 0.6]);
+    assert!(radiance.is_finite() && density > 0.0 && density.is_finite(), "{radiance} {density}");
     let error = Environment::from_hdr(b"nothing").unwrap_err().to_string();
     assert!(error.contains("equirectangular .hdr"), "{error}");
     let black = Environment::new(2, 1, vec![Vec3::ZERO; 2], Mat3::IDENTITY).unwrap();

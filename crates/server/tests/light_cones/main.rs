@@ -6,7 +6,7 @@ mod stage;
 
 use dapple_render::slc::SlcShading;
 use dapple_scene::area_lights::Environment;
-use dapple_server::cones::Now;
+use dapple_server::cones::{Now, cone_charts};
 use dapple_trace::Tracer;
 use dapple_trace::direct::DirectParams;
 
@@ -114,6 +114,26 @@ fn light_of_a_sky_is_all_there_while_entries_are_young() {
         println!("{steps} steps, walks {walks}: {mean:+.2} %");
         assert!(mean.abs() < 1.5, "{mean} % after {steps} steps");
     }
+}
+
+/// Rays light everything, and so do cones: also what says that it carries no points.
+#[test]
+fn what_carries_no_points_is_lit() {
+    let mut stage = Stage::new("cornell", 0.1, [48, 27]);
+    stage.scene.instances.iter_mut().for_each(|instance| instance.receives = false);
+    let (charting, problems) = cone_charts(&stage.scene);
+    assert!(problems.is_empty(), "{problems:?}");
+    stage.charting = charting;
+    let pose = stage.scene.pose(stage.time_s);
+    let tracer = Tracer::new(&stage.scene, &pose);
+    let now = Now { scene: &stage.scene, pose: &pose, tracer: &tracer, environment: None };
+    let path = stage.scene.camera_paths().into_iter().find(|path| path.name == "path-box").unwrap();
+    let seen = stage.see_from(&now, path.camera(&stage.scene, &pose));
+    let mut lit = Lit::new("", SlcShading::default(), true);
+    (0..4).for_each(|_| lit.step(&stage, &now, Some(&seen)));
+    let params = DirectParams { samples: 64, seed: 7, ..DirectParams::default() };
+    let [db, _, bias] = stage.quality(&rays(&now, &seen.points, &params), &lit.picture);
+    assert!(db > 24.0 && bias.abs() < 3.0, "{db} dB, {bias} %");
 }
 
 /// Lights move while nobody looks, and then stand: what was settled before is learnt anew.

@@ -242,10 +242,7 @@ fn a_still_scene_settles_and_then_takes_no_rays() {
             break;
         }
         steps += 1;
-        assert!(
-            steps <= 8 + 24 * 8 + 8,
-            "8 updates of 8 samples, then 8 each 8 frames up to 255, then quiet"
-        );
+        assert!(steps <= 90, "2 updates of 16 samples, then 15 in one of 5 frames up to 255, then quiet");
     }
     let entries: Vec<MomentEntry> = cache.ids().map(|id| *cache.entry(id).unwrap()).collect();
     rig.step(&mut cache, &rig.pose, &rig.pose, &params);

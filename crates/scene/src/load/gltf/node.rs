@@ -11,9 +11,9 @@ use serde_json::Value;
 use super::accessor::Allowed;
 use super::document::{Document, label, name_of};
 use crate::load::LoadError;
-use crate::load::context::is_usable;
+use crate::load::context::{Context, is_usable};
 use crate::load::finish::{Draft, Placement};
-use crate::{Camera, EmitterShape, Light, LightKind, LocalTransform, Node, Projection, Skin};
+use crate::{Camera, EmitterShape, Light, LightKind, LocalTransform, Node, Projection, Scene, Skin};
 
 const MATRICES: Allowed = Allowed::new(&[Type::Mat4], &[ComponentType::F32]);
 
@@ -211,13 +211,15 @@ fn read_node(
             }
             value.and_then(Value::as_bool).unwrap_or(true)
         };
+        let emitter = read_emitter(document, extras.as_ref(), &at);
+        warn_of_emitter(context, scene, mesh, emitter, &at);
         draft.placements.push(Placement {
             node: index as u32,
             mesh: mesh as u32,
             skin: skin.map(|skin| skin as u32),
             casts: flag("casts"),
             receives: flag("receives"),
-            emitter: read_emitter(document, extras.as_ref(), &at),
+            emitter,
         });
     } else if skin.is_some() {
         context.warn(format!("{at} has a skin but no mesh; ignored"));
@@ -248,6 +250,26 @@ fn read_emitter(document: &Document<'_>, extras: Option<&Value>, at: &str) -> Em
         },
         |(_, shape)| *shape,
     )
+}
+
+/// Tells of what stands for a light of a simple form and is none, or is made of several materials that emit: the first is the light's.
+fn warn_of_emitter(context: &Context<'_>, scene: &Scene, mesh: usize, emitter: EmitterShape, at: &str) {
+    if emitter == EmitterShape::Triangles {
+        return;
+    }
+    let parts = scene.meshes[mesh].parts.iter().map(|part| part.material);
+    let mut emitting: Vec<u32> =
+        parts.filter(|material| scene.materials[*material as usize].emissive_factor != Vec3::ZERO).collect();
+    emitting.sort_unstable();
+    emitting.dedup();
+    match emitting.len() {
+        0 => context
+            .warn(format!("{at}: extras.light is of no use, as no material of its mesh emits (emissiveFactor)")),
+        1 => {}
+        n => context.warn(format!(
+            "{at}: extras.light makes one light of a mesh with {n} materials that emit; the first is what it shines with"
+        )),
+    }
 }
 
 fn read_transform(

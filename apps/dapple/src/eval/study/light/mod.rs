@@ -19,7 +19,7 @@ use dapple_store::cones::Charting;
 use super::Subject;
 use super::medians::median;
 use crate::direct_light::picture::read_environment;
-use crate::direct_light::{Cost, Lighter, Seen, Technique, charts, warn_of_lights};
+use crate::direct_light::{CONES_MIB, Cost, Lighter, Seen, Technique, charts, warn_of_lights};
 use crate::eval::stage::Stage;
 use crate::picture::luma;
 
@@ -68,7 +68,7 @@ struct Run {
 
 impl Run {
     fn new(name: impl Into<String>, technique: Technique) -> Result<Run> {
-        let lighter = Lighter::new(technique)?;
+        let lighter = Lighter::new(technique, CONES_MIB)?;
         Ok(Run { name: name.into(), lighter, stages: Vec::new(), totals: Vec::new(), cost: Cost::default() })
     }
 
@@ -96,6 +96,9 @@ impl Run {
         })?;
         if watched {
             self.totals.push(total);
+        }
+        if let Some(why) = cost.refused("draw smaller pictures") {
+            tracing::warn!("{}: {why}", self.name);
         }
         self.cost = cost;
         Ok(pictures)
