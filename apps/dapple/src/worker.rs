@@ -280,7 +280,10 @@ fn config(setup: &Setup, shard: Shard) -> ServerConfig {
         },
         cuts: setup.cuts,
         // Exact but for what nobody sees: the host sends on what it gets.
-        lights: setup.area_lights.map(|tolerance| TrackerParams { tolerance, ..TrackerParams::default() }),
+        lights: setup.area_lights.then(|| {
+            let defaults = TrackerParams::default();
+            TrackerParams { tolerance: setup.light_tolerance.unwrap_or(defaults.tolerance), ..defaults }
+        }),
         shard: Some(shard),
         ..ServerConfig::default()
     }

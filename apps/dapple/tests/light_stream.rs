@@ -86,6 +86,15 @@ fn a_recording_holds_them_and_says_so() {
     assert!(told.contains("lights     5: how much of each"), "{told}");
     let bytes = |name: &str| std::fs::metadata(folder.path().join(name)).unwrap().len();
     assert!(bytes("lit.dapple") > bytes("plain.dapple"));
+    // What is hardly seen may wait, and some of it never comes.
+    record("at-once.dapple", &["--area-lights=0"]);
+    record("late.dapple", &["--area-lights=0.5"]);
+    let sizes = ["at-once.dapple", "lit.dapple", "late.dapple"].map(bytes);
+    assert!(sizes[0] > sizes[1] && sizes[1] > sizes[2], "{sizes:?}");
+    for wrong in ["--area-lights=2", "--area-lights=-1", "--area-lights=nan"] {
+        let refused = [&["record"], &SMALL[..], &["-o", "none.dapple", wrong]].concat();
+        fail(folder.path(), &refused, &["--area-lights", "0 to 1"]);
+    }
 }
 
 fn lights(viewer: &Viewer) -> Option<LightVisibility> {

@@ -174,7 +174,8 @@ fn lights_of_a_form_that_shine_otherwise_are_told() {
     let piece = |material: u32| format!(r#"{{"attributes":{{"POSITION":{p}}},"material":{material}}}"#);
     let (dark, red, green) = (piece(0), piece(1), piece(2));
     let scene = loaded(&b.glb(&format!(
-        r#""materials":[{{}},{{"emissiveFactor":[1,0,0]}},{{"emissiveFactor":[0,1,0]}}],
+        r#""extensionsUsed":["KHR_materials_unlit"],
+        "materials":[{{"emissiveFactor":[1,1,1],"extensions":{{"KHR_materials_unlit":{{}}}}}},{{"emissiveFactor":[1,0,0]}},{{"emissiveFactor":[0,1,0]}}],
         "meshes":[{{"primitives":[{dark}]}},{{"primitives":[{dark},{red}]}},{{"primitives":[{red},{green}]}}],
         "nodes":[{{"name":"unlit","mesh":0,"extras":{{"light":"sphere"}}}},{{"name":"lamp","mesh":1,"extras":{{"light":"disc"}}}},
                  {{"name":"two","mesh":2,"extras":{{"light":"rectangle"}}}},{{"name":"mesh","mesh":2,"extras":{{"light":"triangles"}}}}]"#

@@ -84,12 +84,17 @@ impl ServerConfig {
             let lights = AreaLights::new(scene, &scene.pose_undeformed(0.0)).len() as u32;
             LightVisibility::check(points as usize, lights)?;
         }
-        if let Some(TrackerParams { tolerance, .. }) = self.lights
-            && !(0.0..=1.0).contains(&tolerance)
-        {
-            return Err(ServerError::BadLightTolerance(tolerance));
-        }
+        self.check_lights()?;
         Ok(self.update.check()?)
+    }
+
+    fn check_lights(&self) -> Result<(), ServerError> {
+        match self.lights {
+            Some(TrackerParams { tolerance, .. }) if !(0.0..=1.0).contains(&tolerance) => {
+                Err(ServerError::BadLightTolerance(tolerance))
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -164,7 +169,7 @@ pub enum ServerError {
     )]
     UnevenShard,
     /// An error of an area light's visibility that may wait is no share of a point's light.
-    #[error("the share of a point's light that may be off is {0}, must be 0 to 1 (--area-lights=T)")]
+    #[error("--area-lights is {0}, must be 0 to 1: the share of a point's light that may be off for a while")]
     BadLightTolerance(f32),
     /// Points that came did not fit those that there are.
     #[error(transparent)]
@@ -282,6 +287,7 @@ impl Server {
         config: &ServerConfig,
         progress: &(dyn Fn(Progress) + Sync),
     ) -> Result<Server, ServerError> {
+        config.check_lights()?;
         let (count, dropped_inside) = (points.anchors.len(), points.dropped_inside);
         let tracing = |done| progress(Progress::Tracing(done, count));
         let updater = Updater::new(&scene, &pose, &tracer, points, config.update, &tracing)?;

@@ -80,9 +80,12 @@ pub struct Setup {
     pub radius_m: f32,
     /// Whether cuts are looked for.
     pub cuts: bool,
-    /// Points say how much of each area light they see if there is a number: the share of a point's irradiance, 0 … 1, below which an error waits.
+    /// Whether points say how much of each area light they see.
     #[serde(default)]
-    pub area_lights: Option<f32>,
+    pub area_lights: bool,
+    /// The share of a point's irradiance, 0 … 1, below which an error of that waits; `None`: 0.1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light_tolerance: Option<f32>,
     /// Part of the time between two steps that one may take, seconds.
     pub step_s: f64,
     /// Rays a step may take; `None` to go by `step_s`.

@@ -17,6 +17,7 @@ Examples:
   dapple serve room.glb --host 0.0.0.0 --tls-cert cert.pem --tls-key key.pem
   dapple serve --builtin atrium --spare boulder-0=8 --record session.dapple
   dapple serve --builtin street --area-lights    soft shadows of whatever emits
+  dapple serve --builtin street --area-lights=0.5            the same for a third of the bits
   dapple serve --builtin atrium --moq            over QUIC as well (feature moq)
   dapple serve room.glb --relay https://relay.example/dapple?jwt=TOKEN
 

@@ -49,7 +49,7 @@ pub(crate) struct ViewArgs {
     #[arg(long, value_name = "H", allow_hyphen_values = true)]
     pub(crate) hz: Option<f64>,
     /// Draw soft shadows of whatever emits: points say how much of each light they see. What plays a stream or a page draws them where the stream has them. L turns
-    /// them off and on. T is as of dapple serve.
+    /// them off and on. T is as of dapple serve, 0.1 without it.
     #[arg(
         long,
         value_name = "T",

@@ -25,7 +25,7 @@ use dapple_trace::slc::{PaperParams, SlcParams};
 
 use self::card::Card;
 
-/// Memory that cones may take unless somebody says otherwise, MiB: four times what a picture of 1280 × 720 needs. It is taken as it is needed.
+/// Memory that cones may take unless somebody says otherwise, MiB: room for `slc-fine` of a picture of 1280 × 720 with four samples a pixel. It is taken as it is needed.
 pub(crate) const CONES_MIB: u64 = 4096;
 
 /// Steps a second of what remembers earlier frames.
@@ -187,11 +187,10 @@ pub(crate) struct Cost {
 
 impl Cost {
     /// Tells of places that there was no memory for, and what to do.
-    pub(crate) fn refused(&self, more: &str) -> Option<String> {
-        let ConeStep { refused, wanted, .. } = self.step.filter(|step| step.refused > 0)?;
+    pub(crate) fn refused(&self, advice: &str) -> Option<String> {
+        let refused = self.step.map(|step| step.refused).filter(|refused| *refused > 0)?;
         Some(format!(
-            "{refused} of {} places have no cones and stay dark, as the memory for them is full: {more}, or take a method with coarser ones (slc-fast)",
-            wanted + refused
+            "about {refused} places have no light cones and stay dark, as the memory for them is full: {advice}"
         ))
     }
 }

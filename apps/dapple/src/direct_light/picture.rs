@@ -88,9 +88,10 @@ pub(crate) fn add(
         let (mut pictures, cost) = lighter.light(&now, &lights, &seen, &charting, &mut |_| ())?;
         let found = pictures.swap_remove(0);
         if step + 1 == steps {
-            if let Some(why) =
-                cost.refused(&format!("give --light-memory more than {} MiB", lighting.cones_mib))
-            {
+            if let Some(why) = cost.refused(&format!(
+                "give --light-memory more than {} MiB, or draw a smaller picture",
+                lighting.cones_mib
+            )) {
                 tracing::warn!("{why}");
             }
             for ((direct, lit), point) in drawn.shaded.direct.iter_mut().zip(&found).zip(&seen[0].points) {

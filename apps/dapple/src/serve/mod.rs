@@ -299,7 +299,8 @@ fn setup(config: &ServerConfig, step_s: f64, light: &LightArgs) -> Setup {
         rays_still: config.update.rays_still,
         radius_m: config.update.radius_m,
         cuts: config.cuts,
-        area_lights: config.lights.map(|lights| lights.tolerance),
+        area_lights: config.lights.is_some(),
+        light_tolerance: config.lights.map(|lights| lights.tolerance),
         step_s,
         ray_budget: light.step.ray_budget,
     }

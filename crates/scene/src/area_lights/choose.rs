@@ -188,7 +188,7 @@ fn weight_of(sums: &[f32], light: usize) -> f32 {
 #[inline]
 fn cosine_within(normal: Vec3, offset: Vec3, distance: f32, radius: f32) -> f32 {
     let height = normal.dot(offset);
-    if distance <= radius || height == 0.0 && normal == Vec3::ZERO {
+    if distance <= radius || normal == Vec3::ZERO {
         return 1.0;
     }
     // Of many lights, half are here.

@@ -235,6 +235,42 @@ fn an_estimate_is_never_zero_where_light_arrives() {
 }
 
 #[test]
+fn the_largest_cosine_is_that_of_the_best_direction_in_a_ball() {
+    let unit = |u: [f32; 3]| (Vec3::from_array(u) - 0.5).normalize();
+    for (i, u) in cube(40).enumerate() {
+        let offset = unit(u) * 3.0;
+        // Seen from afar as a point, wide, and from its very rim.
+        let radius = [1e-4, 0.5, 1.5, 2.999][i % 4];
+        for (j, v) in cube(40).enumerate() {
+            let normal_world = unit([v[1], v[2], v[0]]);
+            let ground_world = (normal_world + 0.8 * unit(v)).normalize();
+            let facing = Facing { normal_world, ground_world, least_cosine: [0.0, 0.05][j % 2] };
+            // Directions to the ball, from its middle to its rim all around.
+            let (axis, spread) = (offset / 3.0, libm::asinf(radius / 3.0));
+            let (across, along) = axis.any_orthonormal_pair();
+            let towards = (0..9 * 64).map(|k| {
+                let (sine, cosine) = libm::sincosf(spread * (k % 9) as f32 / 8.0);
+                let (sin_turn, cos_turn) = libm::sincosf(TAU * (k / 9) as f32 / 64.0);
+                facing.cosine(axis * cosine + (across * cos_turn + along * sin_turn) * sine)
+            });
+            let found = facing.largest_cosine(offset, radius);
+            let best = towards.fold(0.0, f32::max);
+            // The best of so many lies a little beside the best there is.
+            assert!(
+                found >= best - 1e-5 && found <= best + 0.06,
+                "{facing:?} {offset} {radius}: {found}, {best}"
+            );
+        }
+        let flat = offset.any_orthonormal_vector();
+        for (normal, far, cosine) in
+            [(Vec3::ZERO, radius, 1.0), (flat, 4.0, 1.0), (-offset / 3.0, radius, 0.0)]
+        {
+            assert_eq!(Facing::from(normal).largest_cosine(offset, far), cosine, "{normal} {far}");
+        }
+    }
+}
+
+#[test]
 fn rays_meet_lights_where_samples_lie_on_them() {
     for emitter in EmitterShape::NAMES.map(|(_, shape)| shape) {
         for two_sided in [false, true] {

@@ -13,7 +13,9 @@ use super::document::{Document, label, name_of};
 use crate::load::LoadError;
 use crate::load::context::{Context, is_usable};
 use crate::load::finish::{Draft, Placement};
-use crate::{Camera, EmitterShape, Light, LightKind, LocalTransform, Node, Projection, Scene, Skin};
+use crate::{
+    Camera, EmitterShape, Light, LightKind, LocalTransform, Material, Node, Projection, Scene, Skin,
+};
 
 const MATRICES: Allowed = Allowed::new(&[Type::Mat4], &[ComponentType::F32]);
 
@@ -258,13 +260,13 @@ fn warn_of_emitter(context: &Context<'_>, scene: &Scene, mesh: usize, emitter: E
         return;
     }
     let parts = scene.meshes[mesh].parts.iter().map(|part| part.material);
-    let mut emitting: Vec<u32> =
-        parts.filter(|material| scene.materials[*material as usize].emissive_factor != Vec3::ZERO).collect();
+    let emits = |material: &Material| !material.unlit && material.emissive_factor != Vec3::ZERO;
+    let mut emitting: Vec<u32> = parts.filter(|index| emits(&scene.materials[*index as usize])).collect();
     emitting.sort_unstable();
     emitting.dedup();
     match emitting.len() {
         0 => context
-            .warn(format!("{at}: extras.light is of no use, as no material of its mesh emits (emissiveFactor)")),
+            .warn(format!("{at}: extras.light is of no use, as no material of its mesh emits (emissiveFactor, and not KHR_materials_unlit)")),
         1 => {}
         n => context.warn(format!(
             "{at}: extras.light makes one light of a mesh with {n} materials that emit; the first is what it shines with"

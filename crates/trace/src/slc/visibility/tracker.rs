@@ -19,7 +19,7 @@ use crate::{Tracer, rtao::Site};
 pub struct TrackerParams {
     /// Rays.
     pub visibility: VisibilityParams,
-    /// Share of a point's irradiance below which an error is not seen, ≥ 0, default 0.1. What is off by less waits.
+    /// Share of a point's irradiance below which an error is not seen, 0 … 1, default 0.1. What is off by less waits.
     pub tolerance: f32,
 }
 

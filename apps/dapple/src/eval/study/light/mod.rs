@@ -64,12 +64,21 @@ struct Run {
     stages: Vec<(&'static str, Vec<f64>)>,
     totals: Vec<f64>,
     cost: Cost,
+    /// Whether there was no memory for some cones.
+    has_overflowed: bool,
 }
 
 impl Run {
     fn new(name: impl Into<String>, technique: Technique) -> Result<Run> {
         let lighter = Lighter::new(technique, CONES_MIB)?;
-        Ok(Run { name: name.into(), lighter, stages: Vec::new(), totals: Vec::new(), cost: Cost::default() })
+        Ok(Run {
+            name: name.into(),
+            lighter,
+            stages: Vec::new(),
+            totals: Vec::new(),
+            cost: Cost::default(),
+            has_overflowed: false,
+        })
     }
 
     /// One step, timed if it is `watched`.
@@ -97,7 +106,9 @@ impl Run {
         if watched {
             self.totals.push(total);
         }
-        if let Some(why) = cost.refused("draw smaller pictures") {
+        // Once of each.
+        if let Some(why) = cost.refused("draw smaller pictures").filter(|_| !self.has_overflowed) {
+            self.has_overflowed = true;
             tracing::warn!("{}: {why}", self.name);
         }
         self.cost = cost;
