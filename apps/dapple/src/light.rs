@@ -55,8 +55,9 @@ pub(crate) fn server_config(scene: &Scene, args: &LightArgs) -> Result<ServerCon
 }
 
 /// How visibility of area lights is kept, if that is wanted; says so where there are none.
-fn area_lights(scene: &Scene, tolerance: Option<f32>) -> Option<TrackerParams> {
-    let tolerance = tolerance?;
+fn area_lights(scene: &Scene, wanted: Option<Option<f32>>) -> Option<TrackerParams> {
+    let defaults = TrackerParams::default();
+    let tolerance = wanted?.unwrap_or(defaults.tolerance);
     let lights = AreaLights::new(scene, &scene.pose(0.0));
     if lights.is_empty() {
         tracing::warn!(
@@ -65,7 +66,7 @@ fn area_lights(scene: &Scene, tolerance: Option<f32>) -> Option<TrackerParams> {
     }
     warn_of_lights(&lights);
     warn_of_many(&lights);
-    Some(TrackerParams { tolerance, ..TrackerParams::default() })
+    Some(TrackerParams { tolerance, ..defaults })
 }
 
 /// Tells of more lights than viewers are told of.

@@ -204,20 +204,10 @@ fn area_lights_light_a_picture() {
     )
     .unwrap();
     std::fs::write(at.join("bad.hdr"), b"no picture").unwrap();
+    let box_alone =
+        ["render", "--builtin", "cornell", "--detail", "0.1", "--camera", "path-box", "--method", "none"];
     let render = |name: &str, arguments: &[&str]| {
-        let common = [
-            "--builtin",
-            "cornell",
-            "--detail",
-            "0.1",
-            "--camera",
-            "path-box",
-            "--size",
-            "48x27",
-            "--method",
-            "none",
-        ];
-        succeed(at, &[&["render"], &common[..], &["-o", name], arguments].concat());
+        succeed(at, &[&box_alone[..], &["--size", "48x27", "-o", name], arguments].concat());
         let picture = image::open(at.join(name)).unwrap().to_rgb8().into_raw();
         picture.iter().map(|v| f64::from(*v)).sum::<f64>() / picture.len() as f64
     };
@@ -235,29 +225,8 @@ fn area_lights_light_a_picture() {
         assert!(off * 500 < twin.len(), "{off} of {} bytes differ", twin.len());
     }
     // What there is no room for is told.
-    let full = [
-        "render",
-        "--builtin",
-        "cornell",
-        "--detail",
-        "0.1",
-        "--camera",
-        "path-box",
-        "--size",
-        "320x180",
-        "--method",
-        "none",
-        "--supersample",
-        "1",
-        "--direct-light",
-        "slc-fine",
-        "--light-steps",
-        "1",
-        "--light-memory",
-        "1",
-        "-o",
-        "full.png",
-    ];
+    let fine = ["--direct-light", "slc-fine", "--light-steps", "1", "--light-memory", "1"];
+    let full = [&box_alone[..], &["--size", "320x180", "-o", "full.png"], &fine].concat();
     let (output, out, err) = run(at, &full);
     assert!(output.status.success(), "{out}\n{err}");
     assert!(err.contains("stay dark") && err.contains("--light-memory"), "{err}");

@@ -54,8 +54,8 @@ pub(crate) struct ServedArgs {
     #[arg(long, value_name = "H", default_value_t = 20.0)]
     pub(crate) hz: f64,
     /// With how much of each area light is seen, too (as dapple serve --area-lights[=T], T 0.1 without it).
-    #[arg(long, value_name = "T", num_args = 0..=1, require_equals = true, default_missing_value = "0.1")]
-    pub(crate) area_lights: Option<f32>,
+    #[arg(long, value_name = "T", require_equals = true)]
+    pub(crate) area_lights: Option<Option<f32>>,
     /// Join over QUIC (MoQ), as the server says, or at a relay's address (as dapple view --moq). Needs the feature moq.
     #[arg(long, value_name = "RELAY", num_args = 0..=1, default_missing_value = "")]
     pub(crate) moq: Option<String>,

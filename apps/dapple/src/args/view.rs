@@ -50,15 +50,8 @@ pub(crate) struct ViewArgs {
     pub(crate) hz: Option<f64>,
     /// Draw soft shadows of whatever emits: points say how much of each light they see. What plays a stream or a page draws them where the stream has them. L turns
     /// them off and on. T is as of dapple serve, 0.1 without it.
-    #[arg(
-        long,
-        value_name = "T",
-        num_args = 0..=1,
-        require_equals = true,
-        default_missing_value = "0.1",
-        conflicts_with_all = ["stream", "url"]
-    )]
-    pub(crate) area_lights: Option<f32>,
+    #[arg(long, value_name = "T", require_equals = true, conflicts_with_all = ["stream", "url"])]
+    pub(crate) area_lights: Option<Option<f32>>,
     #[command(flatten)]
     pub(crate) visibility: VisibilityArgs,
     #[command(flatten)]

@@ -44,8 +44,8 @@ pub(crate) struct LightArgs {
     pub(crate) hz: Option<f64>,
     /// Points say how much of each area light they see too (whatever emits: 5 bits a point and light), and viewers draw soft shadows of them.
     /// What is off by less than a share T of a point's light waits: 0.5 for a third of the bits where lights move, 0 for everything at once. T comes behind =; without it, it is 0.1.
-    #[arg(long, value_name = "T", num_args = 0..=1, require_equals = true, default_missing_value = "0.1")]
-    pub(crate) area_lights: Option<f32>,
+    #[arg(long, value_name = "T", require_equals = true)]
+    pub(crate) area_lights: Option<Option<f32>>,
     #[command(flatten)]
     pub(crate) visibility: VisibilityArgs,
     #[command(flatten)]

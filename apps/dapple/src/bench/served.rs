@@ -36,7 +36,10 @@ impl Served {
         let mut child = Command::new(program)
             .args(["serve", "--builtin", &args.builtin, "--detail", &args.detail.to_string()])
             .args(["--points", &args.points.to_string(), "--hz", &args.hz.to_string(), "--port", "0"])
-            .args(args.area_lights.map(|tolerance| format!("--area-lights={tolerance}")))
+            .args(args.area_lights.map(|tolerance| match tolerance {
+                Some(tolerance) => format!("--area-lights={tolerance}"),
+                None => "--area-lights".to_owned(),
+            }))
             .args(more)
             .args(moq)
             .env_remove("DAPPLE_TOKENS")

@@ -4,6 +4,7 @@ use std::sync::{Arc, LazyLock};
 
 use proptest::prelude::*;
 
+use crate::work::{Setup, ToWorker};
 use crate::{FromHost, FromViewer, Guest, GuestConfig, LightHead, LookCamera};
 use dapple_scene::glam::Vec3;
 use dapple_scene::{NoFiles, PosedCamera, Scene, builtin};
@@ -12,6 +13,28 @@ static SCENE: LazyLock<Arc<Scene>> = LazyLock::new(|| {
     let glb = builtin::glb("cornell", 0.1).unwrap();
     Arc::new(dapple_scene::load("cornell.glb", &glb, &NoFiles).unwrap())
 });
+
+/// A host or worker of before has no tolerance of area lights.
+#[test]
+fn how_to_light_comes_through_with_and_without_a_tolerance() {
+    let setup = Setup {
+        points_per_m2: 60.0,
+        seed: 1,
+        rays: 16,
+        rays_still: 0,
+        radius_m: 0.6,
+        cuts: true,
+        area_lights: true,
+        light_tolerance: Some(0.5),
+        step_s: 0.05,
+        ray_budget: None,
+    };
+    let told = ToWorker::Setup(setup).to_text();
+    assert_eq!(ToWorker::parse(&told).unwrap(), ToWorker::Setup(setup));
+    let before = ToWorker::Setup(Setup { light_tolerance: None, ..setup });
+    assert!(!before.to_text().contains("light_tolerance"));
+    assert_eq!(ToWorker::parse(&before.to_text()).unwrap(), before);
+}
 
 #[test]
 fn cameras_come_through() {
