@@ -104,8 +104,10 @@ fn run(cli: Cli) -> anyhow::Result<()> {
     if threads > 1024 {
         anyhow::bail!("--threads is {threads}, must be 0 (one for each core) to 1024");
     }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
-    pool.install(|| match cli.command {
+    // The pool of the whole program, whose threads never end: a thread that has asked an OpenGL driver for something and
+    // ends while the program does, as those of a dropped pool do, frees twice what the driver keeps of it.
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+    rayon::scope(|_| match cli.command {
         Command::Eval(args) => eval::run(&args),
         Command::Render(args) => render::run(&args),
         Command::Quality(args) => eval::quality::run(&args),

@@ -122,13 +122,24 @@ impl Gpu {
         Gpu::from_adapter(adapter).await
     }
 
-    /// A device without any surface, for tests, servers and pictures in files.
+    /// A device without any surface, for tests, servers and pictures in files. OpenGL is asked only where nothing else
+    /// has a device: its drivers look for a display, and complain of none on standard error.
     ///
     /// # Errors
     /// As [`Gpu::request`].
     pub async fn headless() -> Result<Gpu, GpuError> {
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
-        Gpu::request(&instance, None, &GpuOptions::default()).await
+        let all = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+        let backends = all.backends & wgpu::Backends::PRIMARY;
+        if backends != all.backends && !backends.is_empty() {
+            let primary = wgpu::Instance::new(wgpu::InstanceDescriptor {
+                backends,
+                ..wgpu::InstanceDescriptor::new_without_display_handle_from_env()
+            });
+            if let Ok(gpu) = Gpu::request(&primary, None, &GpuOptions::default()).await {
+                return Ok(gpu);
+            }
+        }
+        Gpu::request(&wgpu::Instance::new(all), None, &GpuOptions::default()).await
     }
 
     /// A device of an adapter that was chosen elsewhere.
