@@ -61,6 +61,7 @@ fn html_within(results: &Results, folder: &Path, picture_bytes: usize) -> Result
         ("title", &escape(&results.title)),
         ("style", &STYLE.join("\n")),
         ("body_class", if is_of_studies(results) { " class=\"of-studies\"" } else { "" }),
+        ("kicker", words::kicker(results)),
         ("lead", &words::lead(results)),
         ("headlines", &words::headlines(results)),
         ("advice", &words::advice(results)),

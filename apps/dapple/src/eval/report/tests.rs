@@ -341,6 +341,13 @@ fn the_summary_says_what_is_best_and_by_how_much() {
     let studies = Results { studies: vec![study("radius")], ..results(vec![]) };
     assert!(lead(&studies).starts_with("Studies alone"));
     assert!(html(&studies, Path::new("")).unwrap().contains("<body class=\"of-studies\">"));
+    let kicker = |kinds: &[&str]| {
+        let studies = kinds.iter().copied().map(study).collect();
+        super::words::kicker(&Results { studies, ..results(vec![]) })
+    };
+    assert!(kicker(&["light-methods", "light-viewers"]).starts_with("Direct light"));
+    assert!(kicker(&["light-methods", "radius"]).starts_with("Ambient visibility"));
+    assert!(kicker(&[]).starts_with("Ambient visibility"));
     assert!(
         lead(&results(vec![case("a", vec![row("a", "none", None, &[14.0])])])).contains("without a stream")
     );

@@ -96,6 +96,16 @@ fn named(place: &Place) -> String {
     }
 }
 
+/// What was compared, above the title.
+pub(super) fn kicker(results: &Results) -> &'static str {
+    let of_lights = results.studies.iter().all(|study| study.kind.starts_with("light-"));
+    if super::is_of_studies(results) && of_lights {
+        "Direct light of area lights against ray-traced truth"
+    } else {
+        "Ambient visibility against ray-traced truth"
+    }
+}
+
 /// The first sentences: what a reader takes home.
 pub(super) fn lead(results: &Results) -> String {
     let settings: Vec<_> = results.cases.iter().map(columns::settings).collect();
