@@ -6,8 +6,9 @@ const AREA_NARROW_SINE: f32 = 0.2;
 const AREA_PI: f32 = 3.1415927;
 
 // Texels of a row of the table: `table.rs`.
-const AREA_FIRST_CORNER: i32 = 3;
-const AREA_FIRST_PLACE: i32 = 3;
+const AREA_DISC_M2: i32 = 3;
+const AREA_FIRST_CORNER: i32 = 4;
+const AREA_FIRST_PLACE: i32 = 4;
 const AREA_SPHERE: i32 = 1;
 const AREA_DISC: i32 = 2;
 const AREA_QUAD: i32 = 3;

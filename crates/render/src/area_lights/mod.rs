@@ -13,6 +13,8 @@ pub(crate) mod table;
 #[cfg(test)]
 mod tests;
 
+use std::f32::consts::FRAC_1_PI;
+
 use dapple_scene::ShadingPoint;
 use dapple_scene::area_lights::{AreaLights, LightFigure, LightForm, luminance};
 use dapple_store::cones::LightSet;
@@ -51,6 +53,33 @@ struct Entry {
     radius: f32,
 }
 
+impl Entry {
+    /// Radius² of the disc that is as large as the light looks: from its front if it is flat with one side that shines, else from anywhere in the
+    /// mean, where half of both sides and a fourth of a body's surface show. A ball about a long light is much larger.
+    fn disc_m2(&self) -> f32 {
+        let sides = if self.figure.two_sided { 2.0 } else { 1.0 };
+        match &self.figure.form {
+            LightForm::Sphere { radius, .. } => radius * radius,
+            LightForm::Disc { radius, .. } => radius * radius / sides,
+            LightForm::Quad { corners: [a, b, c, d], .. } => {
+                (area(&[*a, *b, *c]) + area(&[*a, *c, *d])) * FRAC_1_PI / sides
+            }
+            LightForm::Triangles(triangles) => {
+                triangles.iter().map(|triangle| area(&triangle.corners)).sum::<f32>()
+                    * (0.25 * FRAC_1_PI * sides)
+            }
+            LightForm::Places(places) => {
+                places.iter().map(|place| place.area_m2).sum::<f32>() * (0.25 * FRAC_1_PI * sides)
+            }
+        }
+    }
+}
+
+/// Of a triangle, m².
+fn area([a, b, c]: &[Vec3; 3]) -> f32 {
+    0.5 * (*b - *a).cross(*c - *a).length()
+}
+
 /// Least of a channel of a light's colour.
 const LEAST_TINT: f32 = 0.02;
 
@@ -60,7 +89,7 @@ pub(crate) struct Spot {
     pub(crate) light: u32,
     pub(crate) center_world: Vec3,
     pub(crate) radius_m: f32,
-    /// Luminance of its radiance × radius².
+    /// Luminance of its radiance × [`Entry::disc_m2`].
     pub(crate) strength: f32,
     /// Its colour, of luminance 1, with a little of every channel.
     pub(crate) tint: Vec3,
@@ -122,7 +151,8 @@ impl AreaLightTable {
     /// What of each light that shines tells where it is and how bright, for places that it is far from.
     pub(crate) fn spots(&self) -> impl Iterator<Item = Spot> {
         let spot = |(light, entry): (&u32, &Option<Entry>)| {
-            let Entry { figure, center, radius } = entry.as_ref()?;
+            let entry = entry.as_ref()?;
+            let Entry { figure, center, radius } = entry;
             let facing = match &figure.form {
                 LightForm::Disc { normal, .. } | LightForm::Quad { normal, .. } if !figure.two_sided => {
                     *normal
@@ -130,7 +160,7 @@ impl AreaLightTable {
                 _ => Vec3::ZERO,
             };
             let brightness = luminance(figure.radiance);
-            let (strength, tint) = (brightness * radius * radius, figure.radiance / brightness);
+            let (strength, tint) = (brightness * entry.disc_m2(), figure.radiance / brightness);
             // Of a channel that none of some lights has, what is told to be theirs is not lost.
             let tint = tint.max(Vec3::splat(LEAST_TINT));
             (strength > 0.0 && strength.is_finite() && tint.is_finite()).then_some(Spot {

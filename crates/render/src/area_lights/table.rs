@@ -9,7 +9,7 @@ use super::{AreaLightTable, Entry, MAX_PLACES, MAX_TRIANGLES};
 /// Texels of a row: one row a light.
 pub(crate) const TABLE_WIDTH: usize = FIRST_PLACE + 3 * MAX_PLACES;
 /// The first texel of a row that is a corner, or of a triangle or place: three each.
-const FIRST_PLACE: usize = 3;
+const FIRST_PLACE: usize = 4;
 
 // Forms; 0 is a light that does not shine.
 const SPHERE: f32 = 1.0;
@@ -24,7 +24,7 @@ impl AreaLightTable {
     /// Row by row; as many rows as [`AreaLightTable::lights`].
     ///
     /// A row: centre and radius of a ball that holds the light; radiance, form and class ([`LightSet::class_of`]); normal, or number of parts and whether all shine alike, and
-    /// whether both sides do; then corners, or of each triangle its corners with one colour of its radiance each, or of each place position and
+    /// whether both sides do; radius² of a disc as large as it looks ([`Entry::disc_m2`]); then corners, or of each triangle its corners with one colour of its radiance each, or of each place position and
     /// area, normal, radiance.
     pub(crate) fn texels(&self) -> Vec<[f32; 4]> {
         let mut texels = vec![[0.0; 4]; self.entries.len() * TABLE_WIDTH];
@@ -39,7 +39,8 @@ impl AreaLightTable {
     }
 }
 
-fn write(row: &mut [[f32; 4]], Entry { figure, center, radius }: &Entry) {
+fn write(row: &mut [[f32; 4]], entry: &Entry) {
+    let Entry { figure, center, radius } = entry;
     let four = |v: Vec3, w: f32| [v.x, v.y, v.z, w];
     let two_sided = f32::from(u8::from(figure.two_sided));
     row[0] = four(*center, *radius);
@@ -74,4 +75,5 @@ fn write(row: &mut [[f32; 4]], Entry { figure, center, radius }: &Entry) {
     };
     row[1] = four(figure.radiance, form);
     row[2] = facing;
+    row[3][0] = entry.disc_m2();
 }

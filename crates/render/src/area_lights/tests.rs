@@ -176,6 +176,25 @@ fn surface(
 }
 
 #[test]
+fn from_afar_lights_are_as_large_as_their_discs() {
+    const FAR: f32 = 100.0;
+    for (name, stage, _) in kinds() {
+        let table = table(&stage);
+        let spot = table.spots().next().unwrap();
+        let (mut found, mut expected) = (0.0, 0.0);
+        for direction in directions(2000) {
+            let arrival = table.arrival(0, direction * FAR, -direction);
+            found += arrival.map_or(0.0, |arrival| luminance(arrival.irradiance)) * FAR * FAR / PI;
+            let facing = if spot.facing == Vec3::ZERO { 1.0 } else { spot.facing.dot(direction).max(0.0) };
+            expected += spot.strength * facing;
+        }
+        // The ball is told by a few places, of which some see more than a fourth.
+        let most = if name == "faceted ball" { 0.1 } else { 0.01 };
+        assert!((found / expected - 1.0).abs() < most, "{name}: {found}, as a disc {expected}");
+    }
+}
+
+#[test]
 fn what_is_reflected_is_what_many_places_give() {
     for (name, stage, tolerance) in kinds() {
         let table = table(&stage);

@@ -1,16 +1,16 @@
-//! Which lights a cone's energy came from, in 20 bits.
+//! Which lights a cone's energy came from, in 32 bits.
 
 /// Bits of a [`LightSet`].
-pub(super) const LIGHT_SET_BITS: u32 = 20;
+pub(super) const LIGHT_SET_BITS: u32 = 32;
 
 /// Set in a set of several lights.
 const SEVERAL: u32 = 1 << (LIGHT_SET_BITS - 1);
 
 /// Classes that lights fall into where there are several. A prime: lights that are placed in rows of 2, 4, 8 … do not
 /// fall into the same.
-const CLASSES: u32 = 19;
+const CLASSES: u32 = 31;
 
-/// Lights: none, exactly one, or several. One is known by its index; of several only the classes (index modulo 19) are,
+/// Lights: none, exactly one, or several. One is known by its index; of several only the classes (index modulo 31) are,
 /// so a set may claim to hold a light that it does not, never the other way round.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct LightSet(u32);
@@ -19,7 +19,7 @@ impl LightSet {
     /// No light.
     pub const NONE: LightSet = LightSet(0);
 
-    /// One light. An index of 2¹⁹ − 1 or more is known by its class alone.
+    /// One light. An index of 2³¹ − 1 or more is known by its class alone.
     pub fn one(light: u32) -> LightSet {
         if light < SEVERAL - 1 { LightSet(light + 1) } else { LightSet(SEVERAL | 1 << (light % CLASSES)) }
     }
@@ -57,19 +57,19 @@ impl LightSet {
         }
     }
 
-    /// The class of a light, 0 … 18: of several, those of a class are not told apart.
+    /// The class of a light, 0 … 30: of several, those of a class are not told apart.
     pub fn class_of(light: u32) -> u32 {
         light % CLASSES
     }
 
-    /// The set in 20 bits: the index of a single light + 1; of several, the highest bit and one of each class ([`LightSet::class_of`]).
+    /// The set in 32 bits: the index of a single light + 1; of several, the highest bit and one of each class ([`LightSet::class_of`]).
     pub fn bits(self) -> u32 {
         self.0
     }
 
-    /// From [`LightSet::bits`]; higher bits are left out. Any bits are a set.
+    /// From [`LightSet::bits`]. Any bits are a set.
     pub fn from_bits(bits: u32) -> LightSet {
-        LightSet(bits & (2 * SEVERAL - 1))
+        LightSet(bits)
     }
 
     /// The class of each light as a bit.
@@ -111,8 +111,8 @@ mod tests {
     fn one_light_is_exact_and_several_are_classes() {
         let two = LightSet::one(2).union(LightSet::one(7));
         assert_eq!(LightSet::one(7).single(), Some(7));
-        assert!(!LightSet::one(7).may_hold(7 + 19), "one light is no class");
-        assert!(two.may_hold(7 + 19) && !two.may_hold(8));
+        assert!(!LightSet::one(7).may_hold(7 + 31), "one light is no class");
+        assert!(two.may_hold(7 + 31) && !two.may_hold(8));
         assert_eq!((two.single(), LightSet::NONE.single()), (None, None));
         assert!(!LightSet::NONE.may_hold(0) && !LightSet::NONE.meets(LightSet::one(0)));
         assert_eq!(LightSet::one(3).union(LightSet::one(3)).single(), Some(3));

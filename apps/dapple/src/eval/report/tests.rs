@@ -342,7 +342,8 @@ fn the_summary_says_what_is_best_and_by_how_much() {
     assert!(lead(&studies).starts_with("Studies alone"));
     assert!(html(&studies, Path::new("")).unwrap().contains("<body class=\"of-studies\">"));
     let kicker = |kinds: &[&str]| {
-        let studies = kinds.iter().copied().map(study).collect();
+        let of = |kind: &&str| StudyResult { kind: (*kind).to_owned(), ..study("a") };
+        let studies = kinds.iter().map(of).collect();
         super::words::kicker(&Results { studies, ..results(vec![]) })
     };
     assert!(kicker(&["light-methods", "light-viewers"]).starts_with("Direct light"));

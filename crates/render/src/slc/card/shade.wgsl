@@ -176,7 +176,7 @@ fn toward(p: ConePoint, cone: Cone, site: Site, slot: i32) -> Toward {
     if brightness <= 0.0 {
         return nothing;
     }
-    let strength = brightness * ball.w * ball.w;
+    let strength = brightness * area_texel(slot, AREA_DISC_M2).x;
     let tint = max(shine.xyz / brightness, vec3(LEAST_TINT));
     // Inside of its ball it is all around.
     let weight = max(strength * facing / max(distance_squared, ball.w * ball.w), 0.0) * near * near;

@@ -1,4 +1,4 @@
-//! Our entry in 17 bytes a cone and four more.
+//! Our entry in 19 bytes a cone and four more.
 
 use std::f32::consts::PI;
 
@@ -10,6 +10,9 @@ use super::super::moment::{MomentCone, MomentEntry};
 use super::bits::{BitReader, BitWriter};
 use super::floats::{energy_from_bits, energy_to_bits};
 use crate::octahedral::{flatten, unflatten};
+
+/// Of a cone: 148 bits, rounded up.
+const CONE_BYTES: usize = 19;
 
 /// Steps of a component of a direction on either side of 0.
 const DIRECTION_STEPS: f32 = 4095.0;
@@ -26,20 +29,20 @@ const COUNT_BITS: u32 = 3;
 /// The rest of the header.
 const TAKEN_BITS: u32 = 32 - SAMPLES_BITS - COUNT_BITS;
 
-/// An entry of up to `CONES` cones in 4 + 17 · `CONES` bytes. A cone is an octahedral direction in 2 × 13 bits (within 6e-4 rad),
+/// An entry of up to `CONES` cones in 4 + 19 · `CONES` bytes. A cone is an octahedral direction in 2 × 13 bits (within 6e-4 rad),
 /// the square root of the opening angle a in 12 (a within √(π a) / 4095 and 1e-6, so narrow cones stay as they are),
-/// the energy as 3 × [`energy_to_bits`], the lights in 20, the root of the mean cosine in 12 (within 2⁻¹²),
+/// the energy as 3 × [`energy_to_bits`], the lights in 32, the root of the mean cosine in 12 (within 2⁻¹²),
 /// the part of its light that is seen in 12 (within 2⁻¹², but above 0), 0 where that is not known. Moment, fluence and, where that part is known, what is hidden follow from these. C is in 12 bits, samples taken
 /// are modulo 2¹⁷.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PackedMoment<const CONES: usize> {
     header: [u8; 4],
-    cones: [[u8; 17]; CONES],
+    cones: [[u8; CONE_BYTES]; CONES],
 }
 
 impl<const CONES: usize> Default for PackedMoment<CONES> {
     fn default() -> Self {
-        PackedMoment { header: [0; 4], cones: [[0; 17]; CONES] }
+        PackedMoment { header: [0; 4], cones: [[0; CONE_BYTES]; CONES] }
     }
 }
 
@@ -83,18 +86,18 @@ impl<const CONES: usize> PackedMoment<CONES> {
     }
 
     /// Header and cones.
-    pub fn to_parts(&self) -> ([u8; 4], [[u8; 17]; CONES]) {
+    pub fn to_parts(&self) -> ([u8; 4], [[u8; CONE_BYTES]; CONES]) {
         (self.header, self.cones)
     }
 
     /// From [`PackedMoment::to_parts`]. Any bytes will do.
-    pub fn from_parts(header: [u8; 4], cones: [[u8; 17]; CONES]) -> PackedMoment<CONES> {
+    pub fn from_parts(header: [u8; 4], cones: [[u8; CONE_BYTES]; CONES]) -> PackedMoment<CONES> {
         PackedMoment { header, cones }
     }
 }
 
-fn pack_cone(cone: &MomentCone) -> [u8; 17] {
-    let mut bytes = [0; 17];
+fn pack_cone(cone: &MomentCone) -> [u8; CONE_BYTES] {
+    let mut bytes = [0; CONE_BYTES];
     let mut writer = BitWriter::new(&mut bytes);
     for component in flatten(cone.direction()).to_array() {
         writer.put(((component.clamp(-1.0, 1.0) + 1.0) * DIRECTION_STEPS).round() as u32, 13);
@@ -110,7 +113,7 @@ fn pack_cone(cone: &MomentCone) -> [u8; 17] {
     bytes
 }
 
-fn unpack_cone(bytes: &[u8; 17]) -> MomentCone {
+fn unpack_cone(bytes: &[u8; CONE_BYTES]) -> MomentCone {
     let mut reader = BitReader::new(bytes);
     let place = [0; 2].map(|_| (reader.take(13) as f32 / DIRECTION_STEPS - 1.0).min(1.0));
     let root = reader.take(12) as f32 / ANGLE_STEPS;

@@ -91,7 +91,7 @@ fn our_entry_is_within_its_bounds() {
         let cones: Vec<_> = (0..count)
             .map(|i| {
                 let u = uniform(seed, i, 2);
-                let lights = LightSet::from_bits((uniform(seed, i, 3) * 1e6) as u32);
+                let lights = LightSet::from_bits((f64::from(uniform(seed, i, 3)) * 4_294_967_296.0) as u32);
                 // Narrow ones most.
                 let (cos_angle, cosine) = (libm::cosf(3.0 * u * u), 0.01 + 0.99 * u);
                 let cone =
@@ -178,7 +178,7 @@ proptest! {
     fn any_bits_are_an_entry(
         paper in prop::collection::vec(any::<u8>(), 36),
         header: [u8; 4],
-        cones in prop::array::uniform4(prop::array::uniform17(any::<u8>())),
+        cones in prop::array::uniform4(prop::array::uniform19(any::<u8>())),
         normal in any::<u32>(),
     ) {
         let normal = direction(normal, 0);
