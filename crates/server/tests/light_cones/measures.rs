@@ -367,3 +367,32 @@ fn walk<const N: usize>(
         }
     }
 }
+
+/// Prints quality and bias where all lights move and the viewer stands: means of eight moments at each of three places, and the largest bias of any.
+#[test]
+#[ignore = "measures; minutes"]
+fn quality_where_all_lights_move() {
+    let mut found = Vec::new();
+    for start_s in [1.0, 6.0, 11.0] {
+        let stage = Stage { time_s: start_s, ..Stage::new("hangar", 0.3, [192, 108]) };
+        let mut lit = sampled("slc", LookUp::default(), SlcParams::default());
+        let start = stage.scene.pose(start_s);
+        let mut tracer = Tracer::new(&stage.scene, &start);
+        let camera = stage.scene.camera_paths()[0].camera(&stage.scene, &start);
+        for step in 1..=64u32 {
+            let pose = stage.scene.pose(start_s + f64::from(step) / 15.0);
+            tracer.update(&stage.scene, &pose);
+            let now = Now { scene: &stage.scene, pose: &pose, tracer: &tracer, environment: None };
+            let seen = stage.see_from(&now, camera);
+            lit.step(&stage, &now, Some(&seen));
+            if step % 8 == 0 {
+                found.push(stage.quality(&best_truth(&now, &seen, 512), &lit.picture));
+            }
+        }
+    }
+    let [db, ssim, bias] =
+        std::array::from_fn(|k| found.iter().map(|q: &[f64; 3]| q[k]).sum::<f64>() / found.len() as f64);
+    let largest = found.iter().map(|quality| quality[2].abs()).fold(0.0, f64::max);
+    println!("| scene | PSNR | SSIM | bias, % | largest |");
+    println!("| hangar | {db:.2} | {ssim:.4} | {bias:+.2} | {largest:.2} |");
+}
